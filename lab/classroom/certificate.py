@@ -20,12 +20,12 @@ MOST_BYTES = 1 << 20
 
 
 def made_certificate(folder: Path, hosts: Sequence[str], now: datetime.datetime) -> tuple[Path, Path]:
-    """The files of a certificate for these hosts and of its key, which are made if the folder has none.
+    """The files of a certificate for these hosts and of its key, which are made if the folder has none that fits and holds.
 
     Raises BadInput if they cannot be written.
     """
     certificate, key = folder / CERTIFICATE, folder / KEY
-    if is_file(certificate) and is_file(key):
+    if is_file(certificate) and is_file(key) and _fits(certificate, hosts, now):
         return certificate, key
     own = ec.generate_private_key(ec.SECP256R1())
     name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "Teaching lab class")])
@@ -58,13 +58,26 @@ def made_certificate(folder: Path, hosts: Sequence[str], now: datetime.datetime)
 
 def fingerprint(certificate: Path) -> str:
     """The SHA-256 of a certificate, as browsers show it. Raises BadInput for a file that is none."""
+    return ":".join(f"{byte:02X}" for byte in _read(certificate).fingerprint(hashes.SHA256()))
+
+
+def _read(certificate: Path) -> x509.Certificate:
     try:
-        read = x509.load_pem_x509_certificate(read_limited(certificate, MOST_BYTES))
+        return x509.load_pem_x509_certificate(read_limited(certificate, MOST_BYTES))
     except OSError as error:
         raise BadInput(f"certificate '{certificate}' (--certificate): {error.strerror or error}") from None
     except ValueError:
         raise BadInput(f"certificate '{certificate}' (--certificate): a PEM file of a certificate is wanted") from None
-    return ":".join(f"{byte:02X}" for byte in read.fingerprint(hashes.SHA256()))
+
+
+def _fits(certificate: Path, hosts: Sequence[str], now: datetime.datetime) -> bool:
+    """Whether a certificate is for all of these hosts, and valid for another day."""
+    read = _read(certificate)
+    try:
+        named = read.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+    except x509.ExtensionNotFound:
+        return False
+    return read.not_valid_after_utc > now + datetime.timedelta(days=1) and {*map(_alternative, hosts)} <= {*named}
 
 
 def _alternative(host: str) -> x509.GeneralName:

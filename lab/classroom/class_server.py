@@ -85,12 +85,14 @@ class ClassServer:
 
     def __init__(self, roster: Roster, place: Place, port: int = 0) -> None:
         self.roster, self._place = roster, place
+        self.fingerprint = ""  # of the certificate
+        self._secured: dict[str, str] = {}  # uvicorn's names of its files
+        if place.certificate is not None and place.key is not None:
+            self._secure(place.certificate, place.key)
         self._socket = listening(port, place.address, "the class")
         self.port: int = self._socket.getsockname()[1]
         self._token = secrets.token_urlsafe(16)
         self.room: Room
-        self.fingerprint = ""  # of the certificate
-        self._secured: dict[str, str] = {}  # uvicorn's names of its files
         self.ended = threading.Event()  # the teacher's page has ended the class
         self._loop: asyncio.AbstractEventLoop
         self._stopped: asyncio.Event
@@ -110,21 +112,19 @@ class ClassServer:
             self.roster.write()
         except OSError as error:
             raise BadInput(f"folder of the class '{self.roster.folder}': {error.strerror or error}") from None
-        if self._place.secured:
-            self._secure(self._place.certificate, self._place.key)
+        if self._place.secured and not self._secured:
+            now = datetime.datetime.now(datetime.UTC)
+            self._secure(*made_certificate(self.roster.folder, self._place.hosts, now))
         self._thread.start()
         if not self._ready.wait(START_S):
             raise WorkFailed(f"class: the server on port {self.port} did not start within {START_S} s")
         return self
 
-    def _secure(self, certificate: Path | None, key: Path | None) -> None:
-        if certificate is None or key is None:
-            now = datetime.datetime.now(datetime.UTC)
-            certificate, key = made_certificate(self.roster.folder, self._place.hosts, now)
+    def _secure(self, certificate: Path, key: Path) -> None:
         self.fingerprint = fingerprint(certificate)
         self._secured = {"ssl_certfile": str(certificate), "ssl_keyfile": str(key)}
         try:
-            ssl.create_default_context(ssl.Purpose.CLIENT_AUTH).load_cert_chain(certificate, key)
+            ssl.create_default_context(ssl.Purpose.CLIENT_AUTH).load_cert_chain(certificate, key, password="")
         except (OSError, ssl.SSLError) as error:
             raise BadInput(f"certificate '{certificate}' and key '{key}': {error}") from None
 

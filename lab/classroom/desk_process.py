@@ -9,7 +9,7 @@ import threading
 from _thread import interrupt_main
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -18,9 +18,11 @@ from lab.advice.entries import FILE
 from lab.errors import LabError
 from lab.files import is_file
 from lab.operating_system import own_session
+from lab.plugins.code_file import files_taken, take
 from lab.seat.lesson_seat import LessonSeat
 from lab.seat.page.teaching_page import SeatPage
 from lab.seat.run_progress import RunProgress
+from lab.studies.compared import FAMILIES
 from lab.teaching.kept_session import KeptSession, check_new
 from lab.teaching.lesson import teach
 from lab.teaching.lesson_options import LessonOptions
@@ -34,11 +36,17 @@ LAST_S = 10.0  # time for a lesson to end after its pipe has closed
 
 @dataclass(frozen=True)
 class DeskOrder:
-    """What is taught at a desk: the lesson's options, the folder of its session, and the pupil's own toolbox."""
+    """What is taught at a desk: the lesson's options, the folder of its session, and the pupil's own toolbox.
+
+    files: the members from files that the teacher has named, see `lab.plugins.code_file.files_taken`; modules: those that the
+    teacher has named, so that a session that goes on may import them.
+    """
 
     options: LessonOptions
     folder: Path
     toolbox: Path
+    files: Mapping[str, tuple[str, str]] = field(default_factory=files_taken)
+    modules: tuple[str, ...] = ()
 
 
 def sit(order: DeskOrder, pipe: Connection) -> None:
@@ -77,9 +85,11 @@ def _taught(order: DeskOrder, page: SeatPage) -> tuple[Any, ...]:
 
 def _lesson(order: DeskOrder, page: SeatPage) -> Mapping[str, Any]:
     """The document of `lab teach --json`."""
+    for kind, word in order.files.values():
+        take(FAMILIES[kind], word)
     kept = None
     if is_file(order.folder / FILE):
-        kept = KeptSession(order.folder, "lab class --resume")
+        kept = KeptSession(order.folder, "lab class --resume", trusted=order.modules)
     else:
         check_new(order.folder)
     options = order.options if kept is None else kept.options

@@ -82,7 +82,8 @@ class Room:
     def seat(self, pupil: Pupil) -> None:
         """Open the desk of a pupil at the pupil's lesson: the lesson begins, goes on, or is shown if it is over."""
         options = replace(self.roster.lessons[pupil.lesson], seed=self.roster.seed)
-        order = DeskOrder(options, self.folder(pupil, pupil.lesson), self.roster.folder / pupil.folder / "toolbox")
+        folder, toolbox = self.folder(pupil, pupil.lesson), self.roster.folder / pupil.folder / "toolbox"
+        order = DeskOrder(options, folder, toolbox, modules=self.roster.modules)
         before = self.desks.get(pupil.number)
         desk = self.desks[pupil.number] = Desk(order)
         desk.on_news = lambda: self._stirred(pupil.number, desk)

@@ -10,21 +10,24 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from secrets import choice, compare_digest, token_urlsafe
-from typing import Any
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
+from annotated_types import Ge, Le, MinLen
+from pydantic import StringConstraints, TypeAdapter, ValidationError
 
 from lab.errors import BadInput
-from lab.files import is_file, json_of, read_limited, write_whole
+from lab.files import is_file, read_limited, write_whole
 from lab.teaching.lesson_options import LessonOptions
 
 FILE = "class.json"
-FORMAT = "teaching-lab class 1"
+FORMAT: Final = "teaching-lab class 1"
 MOST_BYTES = 1 << 22
 MOST_PUPILS = 60
 NAME_LENGTH = 24
 LETTERS = "23456789abcdefghjkmnpqrstuvwxyz"  # without those that look alike
 CODE_LENGTH = 6
+ADVISORS = ("web",)  # of every lesson
 NAMES = 37  # part of the seed of pseudonyms
 COLOURS = (
     *("amber", "azure", "black", "blue", "bronze", "brown", "copper", "coral", "golden", "green", "grey", "indigo"),
@@ -51,6 +54,20 @@ class Pupil:
         return f"{self.number:02}-{self.name.replace(' ', '-')}"
 
 
+@dataclass
+class _Kept:
+    """The class's file."""
+
+    format: Literal["teaching-lab class 1"]
+    code: Annotated[str, StringConstraints(pattern=f"^[{LETTERS}]{{{CODE_LENGTH}}}$")]
+    lessons: Annotated[list[dict[str, Any]], MinLen(1)]
+    seed: Annotated[int, Ge(0)]
+    most: Annotated[int, Ge(1), Le(MOST_PUPILS)]
+    typed_names: bool
+    port: Annotated[int, Ge(0), Le(65535)]
+    pupils: list[Pupil]
+
+
 class Full(Exception):
     """Raised when a class takes no more pupils; the text says why."""
 
@@ -60,7 +77,7 @@ class Roster:
     """The lessons and pupils of a class; every change is written to `folder` at once.
 
     code: what pupils type to join; port: of the last server, so that pupils' pages find the next one; typed_names: whether
-    pupils choose their names.
+    pupils choose their names; modules: those that the teacher has named for lessons such as gym:MODULE:ID, which is not kept.
     """
 
     folder: Path
@@ -71,6 +88,7 @@ class Roster:
     typed_names: bool = False
     port: int = 0
     pupils: list[Pupil] = field(default_factory=list)
+    modules: tuple[str, ...] = ()
 
     @classmethod
     def new(cls, folder: Path, lessons: Sequence[LessonOptions], seed: int, most: int, typed_names: bool) -> "Roster":
@@ -91,31 +109,31 @@ class Roster:
                 f"'{folder}' (--resume) holds no class: a folder with {FILE} is wanted, as lab class writes it"
             )
         try:
-            return cls._of(folder, json_of(read_limited(path, MOST_BYTES)))
-        except (KeyError, TypeError, ValueError) as error:
-            raise BadInput(
-                f"class '{path}' (--resume): {error or type(error).__name__}: a file of lab class is wanted"
-            ) from None
-
-    @classmethod
-    def _of(cls, folder: Path, kept: dict[str, Any]) -> "Roster":
-        if kept["format"] != FORMAT:
-            raise ValueError(f"format {kept['format']!r}, known: {FORMAT!r}")
-        lessons = tuple(LessonOptions.from_json(options, f"class '{folder}' (--resume)") for options in kept["lessons"])
-        pupils = [Pupil(**pupil) for pupil in kept["pupils"]]
-        for number, pupil in enumerate(pupils, start=1):
-            if pupil.number != number or clean_name(pupil.name) != pupil.name or not 0 <= pupil.lesson <= len(lessons):
-                raise ValueError(f"pupil {number} is {asdict(pupil)}")
-        plain = {name: kept[name] for name in ("code", "seed", "most", "typed_names", "port")}
-        return cls(folder, lessons=lessons, pupils=pupils, **plain)
+            kept = TypeAdapter(_Kept).validate_json(read_limited(path, MOST_BYTES), strict=True)
+        except OSError as error:
+            raise BadInput(f"class '{path}' (--resume): {error.strerror or error}") from None
+        except ValidationError as error:
+            why = error.errors(include_url=False)[0]
+            at = ".".join(map(str, why["loc"]))
+            raise BadInput(f"class '{path}' (--resume): {at}: {why['msg']}: a file of lab class is wanted") from None
+        where = f"class '{path}' (--resume)"
+        lessons = tuple(LessonOptions.from_json(options, where) for options in kept.lessons)
+        for options in lessons:
+            if options.advisors != ADVISORS:
+                raise BadInput(
+                    f"{where}: lesson '{options.subtask}' has the advisors {options.advisors}: pupils advise: {ADVISORS}"
+                )
+        for number, pupil in enumerate(kept.pupils, start=1):
+            if pupil.number != number or clean_name(pupil.name) != pupil.name or not 0 <= pupil.lesson < len(lessons):
+                raise BadInput(f"{where}: pupil {number} is {asdict(pupil)}: a file of lab class is wanted")
+        return cls(folder, kept.code, lessons, kept.seed, kept.most, kept.typed_names, kept.port, kept.pupils)
 
     def write(self) -> None:
         """Write the roster, whose folder is made if it is missing. Raises OSError."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        kept = {name: getattr(self, name) for name in ("code", "seed", "most", "typed_names", "port")}
-        kept |= {"lessons": [options.to_json() for options in self.lessons]}
-        kept |= {"pupils": [asdict(pupil) for pupil in self.pupils]}
-        write_whole(self.folder / FILE, (json.dumps({"format": FORMAT} | kept, indent=1) + "\n").encode())
+        lessons = [options.to_json() for options in self.lessons]
+        kept = _Kept(FORMAT, self.code, lessons, self.seed, self.most, self.typed_names, self.port, self.pupils)
+        write_whole(self.folder / FILE, (json.dumps(asdict(kept), indent=1) + "\n").encode())
 
     # ---- pupils
 

@@ -7,7 +7,7 @@ import typer
 
 from lab.cli import deferred
 from lab.cli.families import from_files, offers
-from lab.cli.options import GateName, Json, LearnerName, Port, Seed
+from lab.cli.options import GateName, Json, LearnerName, Port, Seed, TrustModule
 from lab.cli.output import console, show
 from lab.errors import BadInput, counted
 from lab.lazy import rich
@@ -56,6 +56,15 @@ def hold_class(
         Path | None, typer.Option("--certificate", help="Certificate (PEM); default: made on the spot.")
     ] = None,
     key: Annotated[Path | None, typer.Option("--key", help="The key of the certificate (PEM).")] = None,
+    trust_module: TrustModule = None,
+    own: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--own",
+            help="With --resume: a problem, gate or learner of your own that the class had, ./mine.py:MyGate; its code runs.",
+            callback=from_files("gates", "learners", "advisors", "problems"),
+        ),
+    ] = None,
     port: Port = 0,
     seed: Seed = 0,
     as_json: Json = False,
@@ -71,8 +80,11 @@ def hold_class(
                 f"--resume {resume} beside lessons or --out: a class goes on with its own lessons in its own folder"
             )
         roster = deferred.Roster.read(resume)
+        roster.modules = tuple(trust_module or ())
     else:
         roster = _new(lessons or [], out, pupils, typed_names, seed, (task, learner, gate, episodes))
+        roster.modules = tuple(filter(None, map(_module, roster.lessons)))
+    _check(roster)
     place = deferred.place_of(lan, name or (), certificate, key)
     said = console()
     with deferred.ClassServer(roster, place, port or roster.port) as server:
@@ -100,11 +112,26 @@ def _new(
     for lesson in lessons:
         is_skill = lesson in deferred.SKILLS
         of = deferred.LessonOptions(
-            lesson, task if is_skill else None, None, learner, gate, None, ("web",), episodes=episodes, seed=seed
+            lesson, task if is_skill else None, None, learner, gate, None, deferred.PUPILS, episodes=episodes, seed=seed
         )
-        deferred.subject_of(of)  # every lesson is checked before anybody joins
         wanted.append(of)
     return deferred.Roster.new(out, wanted, seed, pupils, typed_names)
+
+
+def _module(lesson: "deferred.LessonOptions") -> str:
+    """The module that a lesson such as gym:MODULE:ID would import, "" for none."""
+    return deferred.parse_name(lesson.subtask, "LESSON").module if lesson.subtask.startswith("gym:") else ""
+
+
+def _check(roster: "deferred.Roster") -> None:
+    """Check every lesson before anybody joins. Raises BadInput, also for code that is named in the class's file alone."""
+    for lesson in roster.lessons:
+        if (module := _module(lesson)) and module not in roster.modules:
+            raise BadInput(
+                f"class '{roster.folder}' names the module '{module}', whose code would run: if you trust whoever made it, "
+                f"say --trust-module {module}"
+            )
+        deferred.subject_of(lesson)
 
 
 def _summary(document: dict[str, Any]) -> Any:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from lab.classroom.class_server import ClassServer
     from lab.classroom.code_picture import code_text
     from lab.classroom.holding import attend, begun_words, closing, place_of
+    from lab.classroom.roster import ADVISORS as PUPILS
     from lab.classroom.roster import Roster
     from lab.export import FORMATS
     from lab.export.commands import Path as Lines
@@ -148,7 +149,7 @@ TABLE = {
     "lab.classroom.class_server": ("ClassServer",),
     "lab.classroom.code_picture": ("code_text",),
     "lab.classroom.holding": ("attend", "begun_words", "closing", "place_of"),
-    "lab.classroom.roster": ("Roster",),
+    "lab.classroom.roster": ("ADVISORS as PUPILS", "Roster"),
     "lab.export": ("FORMATS",),
     "lab.export.commands": ("Path as Lines",),
     "lab.export.program": ("Options", "POSITIONS", "Program"),

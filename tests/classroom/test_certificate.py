@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from lab.classroom.certificate import fingerprint, made_certificate
+from lab.classroom.certificate import DAYS, fingerprint, made_certificate
 from lab.errors import BadInput
 from lab.operating_system import WINDOWS
 
@@ -30,6 +30,15 @@ def test_it_is_made_once(tmp_path: Path) -> None:
     made_certificate(tmp_path, ["192.0.2.7"], NOW)
     assert fingerprint(certificate) == before
     assert len(before) == 32 * 3 - 1
+
+
+def test_it_is_made_anew_for_other_hosts_and_when_it_ends(tmp_path: Path) -> None:
+    certificate, _ = made_certificate(tmp_path, ["192.0.2.7"], NOW)
+    before = fingerprint(certificate)
+    made_certificate(tmp_path, ["192.0.2.8"], NOW)
+    other = fingerprint(certificate)
+    made_certificate(tmp_path, ["192.0.2.8"], NOW + datetime.timedelta(days=DAYS))
+    assert len({before, other, fingerprint(certificate)}) == 3
 
 
 def test_what_is_no_certificate_is_refused(tmp_path: Path) -> None:

@@ -1,10 +1,14 @@
 """`lab class` at the command line: what is refused before anybody can join."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from lab.classroom.roster import ADVISORS, FILE, Roster
+from lab.teaching.lesson_options import LessonOptions
 
 Lab = Callable[..., Any]
 
@@ -36,3 +40,20 @@ def test_what_is_refused(
     assert said in ran.err
     assert ran.err.count("\n") == 1
     assert not [*tmp_path.iterdir()]
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [({"subtask": "gym:evil:X-v0"}, "--trust-module evil"), ({"gate": "mine.Gate"}, "--own ./mine.py:Gate")],
+)
+def test_code_that_is_named_in_the_file_alone_is_not_run(
+    lab: Lab, tmp_path: Path, changed: dict[str, str], said: str
+) -> None:
+    lesson = LessonOptions("world-1", advisors=ADVISORS).to_json() | changed
+    roster = Roster.new(tmp_path / "class", [], 0, 3, False)
+    roster.write()
+    path = tmp_path / "class" / FILE
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"lessons": [lesson]}))
+    ran = lab("class", "--resume", str(tmp_path / "class"))
+    assert (ran.code, ran.out) == (2, "")
+    assert said in ran.err
