@@ -79,7 +79,7 @@ HEAVY = (
 )
 READS_ITS_OWN = (  # what ships with the lab, or what it has just written: nothing that a stranger may have made
     *(
-        "lab.classroom.class_server",
+        "lab.classroom.class_place",
         "lab.view.meshcat",
         "lab.view.server_page",
         "lab.studies.report",

@@ -13,7 +13,6 @@ import time
 from collections import deque
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -29,18 +28,16 @@ from uvicorn import Server as Uvicorn
 from websockets.exceptions import ConnectionClosed
 
 from lab.classroom.certificate import fingerprint, made_certificate
+from lab.classroom.class_place import Place, files_of
 from lab.classroom.code_picture import code_svg
 from lab.classroom.room import OVER, RELOAD, PupilPage, Room
 from lab.classroom.roster import Full, Roster
 from lab.classroom.tile import COLUMNS
 from lab.errors import BadInput, WorkFailed
 from lab.files import csv_of
-from lab.seat.page.page_panel import SeatPanel
-from lab.view.meshcat import SERVED, page_files
-from lab.view.server import File, config_of, listening
+from lab.view.server import config_of, listening
 from lab.view.server_page import quiet_when_full
 
-HERE = Path(__file__).parent
 START_S, STOP_S = 10.0, 30.0
 AGAIN_S = 0.5  # after which a page whose desk was killed is told to load again
 READ_S = 0.005  # least interval between two messages from a page
@@ -51,29 +48,6 @@ WRONG, WRONG_S = 20, 60.0  # wrong codes that an address may try in so many seco
 MOST_ADDRESSES = 1000
 MOST_BODY = 2048  # bytes of a request to join
 FREE = '"free": true'  # in a message about the seat
-POLICY = (
-    "default-src 'none'; script-src 'self'; style-src 'self'; img-src data:; connect-src 'self' {sockets}; "
-    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-)
-
-
-@dataclass(frozen=True)
-class Place:
-    """Where a class is found: the address that is bound, and the host names in pupils' addresses.
-
-    secured: whether over TLS, with `certificate` and `key` (PEM files), or with ones that are made for the class.
-    """
-
-    address: str = "127.0.0.1"
-    hosts: tuple[str, ...] = ("127.0.0.1", "localhost")
-    secured: bool = False
-    certificate: Path | None = None
-    key: Path | None = None
-
-    @property
-    def scheme(self) -> str:
-        """Of the class's addresses."""
-        return "https" if self.secured else "http"
 
 
 class ClassServer:
@@ -104,7 +78,7 @@ class ClassServer:
         self.join_url = f"{place.scheme}://{base}/?code={roster.code}"
         self.teacher_url = f"{place.scheme}://{base}/teacher/?token={self._token}"
         self._picture = code_svg(self.join_url)
-        self._files = self._pages()
+        self._files = files_of(place.hosts, self.port)
 
     def __enter__(self) -> "ClassServer":
         self.roster.port = self.port
@@ -165,22 +139,6 @@ class ClassServer:
         await asyncio.sleep(0)
 
     # ---- what is served
-
-    def _pages(self) -> dict[str, dict[str, File]]:
-        """The files by the first part of their address."""
-        sockets = " ".join(f"{scheme}://{host}:{self.port}" for host in self._place.hosts for scheme in ("ws", "wss"))
-        policy = POLICY.format(sockets=sockets)
-        own = {
-            name: File(
-                (HERE / name).read_bytes(), {"js": "text/javascript", "css": "text/css"}[name.rpartition(".")[2]]
-            )
-            for name in ("class.css", "join.js", "teacher.js", "teacher_tile.js")
-        }
-        panel = [*SeatPanel.files, HERE / "class_bar.html", HERE / "class_bar.css", HERE / "class_bar.js"]
-        desk = page_files("Teaching lab", panel)
-        desk[""] = File(desk[""].content, desk[""].kind, SERVED.replace("ws://127.0.0.1:* ws://localhost:*", sockets))
-        page = {name: File((HERE / f"{name}.html").read_bytes(), "text/html", policy) for name in ("join", "teacher")}
-        return {"": own | {"": page["join"]}, "desk": desk, "teacher": own | {"": page["teacher"]}}
 
     def _application(self) -> Starlette:
         guards = [Middleware(TrustedHostMiddleware, allowed_hosts=self._place.hosts, www_redirect=False)]

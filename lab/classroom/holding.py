@@ -6,7 +6,8 @@ from ipaddress import ip_address
 from pathlib import Path
 from typing import Any
 
-from lab.classroom.class_server import ClassServer, Place
+from lab.classroom.class_place import Place
+from lab.classroom.class_server import ClassServer
 from lab.classroom.tile import COLUMNS
 from lab.errors import BadInput
 from lab.files import csv_of, is_file, write_whole

@@ -12,7 +12,7 @@ from typing import Any
 
 from lab.lazy import lark
 from lab.words.reader import Token
-from lab.words.vocabulary import clause_kinds, rows
+from lab.words.vocabulary import READ, clause_kinds, rows
 
 MOST_READINGS = 256
 
@@ -72,29 +72,14 @@ def slots_of(tokens: Sequence[Token], start: str) -> list[tuple[Slot, ...]]:
 
 
 @cache
-def _kinds(start: str) -> tuple[str, ...]:
-    extra = [
-        "COMMA",
-        "DOT",
-        "NUM",
-        "ONE",
-        "LENGTH",
-        "NAME",
-        "PART",
-        "KIND",
-        "STATION",
-        "ACT",
-        "ACTKIND",
-        "ORDINAL",
-        "THATIS",
-    ]
-    return tuple(dict.fromkeys((*rows("common"), *rows("map"), *rows("order"), *extra)))
+def _kinds() -> tuple[str, ...]:
+    return tuple(dict.fromkeys((*rows("common"), *rows("map"), *rows("order"), *READ)))
 
 
 @cache
 def _parser(start: str) -> Any:
     """The parser of a kind of scenes (a `lark.Lark`)."""
-    kinds = _kinds(start)
+    kinds = _kinds()
     text = files("lab.words").joinpath("grammar.lark").read_text(encoding="utf-8")
     marks = " | ".join(kind for kind in kinds if kind not in clause_kinds("never alone"))
 

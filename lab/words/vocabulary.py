@@ -30,6 +30,23 @@ ORDINALS = {
     "tenth": 10, "1st": 1, "2nd": 2, "3rd": 3, **{f"{n}th": n for n in range(4, 13)},
 }  # fmt: skip
 
+READ = (
+    "COMMA",
+    "DOT",
+    "NUM",
+    "ONE",
+    "LENGTH",
+    "NAME",
+    "PART",
+    "KIND",
+    "STATION",
+    "ACT",
+    "ACTKIND",
+    "ORDINAL",
+    "THATIS",
+)
+"""The kinds that the reader finds without the file."""
+
 Form = tuple["str | tuple[Form, ...]", ...]  # a phrase: words, and choices of forms
 
 

@@ -13,7 +13,8 @@ import pytest
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosedError
 
-from lab.classroom.class_server import ClassServer, Place
+from lab.classroom.class_place import Place
+from lab.classroom.class_server import ClassServer
 from lab.classroom.roster import Roster
 from lab.teaching.lesson_options import LessonOptions
 

@@ -11,7 +11,8 @@ import pytest
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosedError, InvalidStatus
 
-from lab.classroom.class_server import WRONG, ClassServer, Place
+from lab.classroom.class_place import Place
+from lab.classroom.class_server import WRONG, ClassServer
 from lab.classroom.roster import Roster
 from lab.seat.lesson_seat import LessonSeat
 from lab.seat.run_progress import RunProgress

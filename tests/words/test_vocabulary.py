@@ -3,24 +3,11 @@
 import re
 from pathlib import Path
 
-from lab.words.vocabulary import Phrases, as_read, known_words, other_words, phrases, rows
+from lab.words.vocabulary import READ, Phrases, as_read, known_words, other_words, phrases, rows
 
 GRAMMAR = Path(__file__).resolve().parents[2] / "lab" / "words" / "grammar.lark"
-READ = {
-    "NUM",
-    "ONE",
-    "LENGTH",
-    "NAME",
-    "PART",
-    "KIND",
-    "STATION",
-    "ACT",
-    "ACTKIND",
-    "ORDINAL",
-    "THATIS",
-}  # made by the reader
 SLOTS = {"dir", "side", "amount", "until", "thing", "part", "station", "work", "numbered"}
-KINDS = {*rows("common"), *rows("map"), *rows("order"), *READ, "COMMA", "DOT"}
+KINDS = {*rows("common"), *rows("map"), *rows("order"), *READ}
 
 
 def test_the_grammar_and_the_clauses_name_kinds_of_words_that_there_are() -> None:
