@@ -71,7 +71,10 @@ def practice_cells(words: str | None) -> tuple[Cell, ...]:
     Raises BadInput for what is no cell.
     """
     names = [] if words is None else words.split(",")
-    return tuple(load_cell_beside(name.strip(), InstanceRequest()).cell() for name in names)
+    try:
+        return tuple(load_cell_beside(name.strip(), InstanceRequest()).cell() for name in names)
+    except BadInput as error:
+        raise BadInput(f"--practice {words}: {error}") from None
 
 
 def learned_policy(cell: Cell, search: Search, found: Sequence[SequenceResult], seed: int) -> CarriedPolicy | None:

@@ -117,7 +117,10 @@ def of_tasks(subject: Subject, tasks: Sequence[str], make: Callable[[str], Subje
         raise BadInput(
             f"task '{tasks[0]}' (--peer-task): '{subject.name}' is no sub-task of a task: remove --peer-task"
         )
-    return [subject, *map(make, tasks)]
+    try:
+        return [subject, *map(make, tasks)]
+    except BadInput as error:
+        raise BadInput(f"--peer-task {', '.join(tasks)}: {error}") from None
 
 
 def check_alone(given: Mapping[str, object]) -> None:
