@@ -7,7 +7,7 @@ import typer
 
 from lab.cli import deferred
 from lab.cli.families import from_files, offers
-from lab.cli.options import GateName, Json, LearnerName, Port, Seed, TrustModule
+from lab.cli.options import GateName, Json, LearnerName, Own, Port, Seed, TrustModule
 from lab.cli.output import console, show
 from lab.errors import BadInput, counted
 from lab.lazy import rich
@@ -57,14 +57,7 @@ def hold_class(
     ] = None,
     key: Annotated[Path | None, typer.Option("--key", help="The key of the certificate (PEM).")] = None,
     trust_module: TrustModule = None,
-    own: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--own",
-            help="With --resume: a problem, gate or learner of your own that the class had, ./mine.py:MyGate; its code runs.",
-            callback=from_files("gates", "learners", "advisors", "problems"),
-        ),
-    ] = None,
+    own: Own = None,
     port: Port = 0,
     seed: Seed = 0,
     as_json: Json = False,

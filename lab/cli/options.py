@@ -93,6 +93,14 @@ TrustModule = Annotated[
         "--trust-module", help="A module that the session names (gym:MODULE:ID) may be imported: its code runs."
     ),
 ]
+Own = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--own",
+        help="A gate, learner, advisor or problem of your own that what is kept names, ./mine.py:MyGate; its code runs.",
+        callback=from_files("gates", "learners", "advisors", "problems"),
+    ),
+]
 Toasts = Annotated[
     int | None,
     typer.Option("--toasts", "-n", help="How many parts of the task's first kind, 1 to 50; default: as its file says."),

@@ -7,9 +7,8 @@ from typing import Annotated, Any
 import typer
 
 from lab.cli import deferred
-from lab.cli.families import from_files
 from lab.cli.lessons import lesson_seat, say_read, sequenced
-from lab.cli.options import Json, Plain, Port, ToolboxPlace, TrustModule
+from lab.cli.options import Json, Own, Plain, Port, ToolboxPlace, TrustModule
 from lab.cli.output import complain, console, end, show
 from lab.cli.view import replay_page, serve
 from lab.errors import BadInput
@@ -29,14 +28,7 @@ def replay(
     page: Annotated[bool, typer.Option("--page", help="Also show it on a page on 127.0.0.1.")] = False,
     port: Port = 0,
     plain: Plain = False,
-    own: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--own",
-            help="A gate, learner, advisor or problem of your own that the session had, ./mine.py:MyGate; its code runs.",
-            callback=from_files("gates", "learners", "advisors", "problems"),
-        ),
-    ] = None,
+    own: Own = None,
     minari: Annotated[
         str | None,
         typer.Option("--minari", help="Save its steps as a Minari dataset of this name, such as lab/mine-v0."),
