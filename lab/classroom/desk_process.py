@@ -18,14 +18,14 @@ from lab.advice.entries import FILE
 from lab.errors import LabError
 from lab.files import is_file
 from lab.operating_system import own_session
-from lab.plugins.code_file import files_taken, take
+from lab.plugins.code_file import files_taken
 from lab.seat.lesson_seat import LessonSeat
 from lab.seat.page.teaching_page import SeatPage
 from lab.seat.run_progress import RunProgress
-from lab.studies.compared import FAMILIES
 from lab.teaching.kept_session import KeptSession, check_new
 from lab.teaching.lesson import teach
 from lab.teaching.lesson_options import LessonOptions
+from lab.teaching.own_members import take_again
 from lab.teaching.subjects import subject_of
 from lab.teaching.teacher import Teacher
 from lab.toolbox.registry import Toolbox
@@ -85,8 +85,7 @@ def _taught(order: DeskOrder, page: SeatPage) -> tuple[Any, ...]:
 
 def _lesson(order: DeskOrder, page: SeatPage) -> Mapping[str, Any]:
     """The document of `lab teach --json`."""
-    for kind, word in order.files.values():
-        take(FAMILIES[kind], word)
+    take_again(order.files)
     kept = None
     if is_file(order.folder / FILE):
         kept = KeptSession(order.folder, "lab class --resume", trusted=order.modules)

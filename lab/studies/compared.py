@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.advice.advising import Advising
-from lab.advice.advisors import ADVISORS, MODEL, not_called
+from lab.advice.advisors import MODEL, not_called
 from lab.errors import BadInput
 from lab.files import code_key
 from lab.lazy import matplotlib
@@ -30,15 +30,14 @@ from lab.learning.session import Session
 from lab.learning.simulated_advice import TableAdvisor
 from lab.learning.updates import UPDATES
 from lab.mdp import BoolArray, FloatArray
-from lab.plugins.code_file import files_taken, take
-from lab.plugins.family import Family
+from lab.plugins.code_file import files_taken
 from lab.statistics import interval, share
 from lab.studies.charts import legend_below
 from lab.studies.findings import Findings, Row, mean_row, share_row, varying_row
 from lab.studies.runner import Job
 from lab.tasks.record import Learned
 from lab.teaching.lesson import Subject
-from lab.teaching.named_problems import PROBLEMS
+from lab.teaching.own_members import take_again
 from lab.teaching.subjects import Teachable, subject_from
 from lab.version import __version__
 from lab.view.canvas import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, RED, SKY, picture_bytes
@@ -178,7 +177,6 @@ class ComparedSessions:
 # ---- the comparison -------------------------------------------------------------------------------------------------
 
 
-FAMILIES: dict[str, Family[Any]] = {"gates": GATES, "learners": UPDATES, "advisors": ADVISORS, "problems": PROBLEMS}
 MEASURES = (
     "solved_percent: sessions whose final greedy path is optimal. mean_steps: of all episodes, a failed one as the "
     "step limit + 1 (the area under the learning curve). last_steps: of the last episode. helped_steps, requests, misleads, "
@@ -272,8 +270,7 @@ def compared(what: Compared, job: Job) -> Findings:
 
 def sessions_of(setting: ComparedSetting, sessions: int, seed: int, stream: int | None = None) -> ComparedSessions:
     """The results of sessions of a setting, compiled if learner, gate and advisor are; stream: selects other seeds."""
-    for kind, word in setting.of.files.values():
-        take(FAMILIES[kind], word)
+    take_again(setting.of.files)
     subject, problem = setting.subject(), prepared(setting.of, seed)
     how, environment = subject.settings, problem.environment or TableEnvironment(problem.mdp)
     advising = replace(Advising.of([setting.advisor]), region=subject.region)

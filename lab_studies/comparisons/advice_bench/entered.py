@@ -14,8 +14,8 @@ from lab.errors import BadInput, check_value, unknown
 from lab.files import code_key
 from lab.learning.gates import GATES, Gate
 from lab.learning.own_rules import WORTH_COMPILING, tell_uncompiled
-from lab.plugins.code_file import files_taken, from_file, take
-from lab.studies.compared import FAMILIES
+from lab.plugins.code_file import files_taken, from_file
+from lab.teaching.own_members import take_again
 from lab_studies.comparisons.advice_bench import families
 from lab_studies.comparisons.advice_bench.bad_advisors import ADVISORS, advice_of
 from lab_studies.comparisons.advice_bench.problems import HELD_OUT, PROBLEMS, Benched, own_problem, problem
@@ -71,8 +71,7 @@ class Entered:
 
     def load(self) -> None:
         """Adds the members from files, and the classes, to the families of this process."""
-        for kind, word in self.files.values():
-            take(FAMILIES[kind], word)
+        take_again(self.files)
         for gate in self.gates.values():
             GATES.named(gate)
 
