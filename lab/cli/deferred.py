@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from lab.lazy import loader
 
 if TYPE_CHECKING:
-    from lab.advice.advisors import ADVISORS, MODEL, AdvisorName, split_praise
+    from lab.advice.advisors import ADVISORS, MODEL, PAGE_OF, AdvisorName, split_praise
     from lab.advice.entries import Read, read_journal
     from lab.advice.panel import ASKED, DECISIONS
     from lab.api.scenes import SceneRequest as SceneAsked
@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from lab.seat.page.finding_page import FindingPage
     from lab.seat.page.teaching_page import SeatPage
     from lab.seat.run_progress import RunProgress
+    from lab.seat.team import Team
     from lab.seat.terminal.console_app import OperatorConsole
     from lab.seat.terminal.console_view import PlainConsole
     from lab.seat.terminal.line_reader import default_reader
@@ -141,7 +142,7 @@ if TYPE_CHECKING:
     from lab.workers import Workers
 
 TABLE = {
-    "lab.advice.advisors": ("AdvisorName", "ADVISORS", "MODEL", "split_praise"),
+    "lab.advice.advisors": ("AdvisorName", "ADVISORS", "MODEL", "PAGE_OF", "split_praise"),
     "lab.advice.entries": ("Read", "read_journal"),
     "lab.advice.panel": ("ASKED", "DECISIONS"),
     "lab.api.scenes": ("SceneRequest as SceneAsked", "seen"),
@@ -179,6 +180,7 @@ TABLE = {
     "lab.production.sequencing_job": ("sequence_named", "SequencingOptions"),
     "lab.seat.language_model": ("language_models",),
     "lab.seat.lesson_seat": ("LessonSeat",),
+    "lab.seat.team": ("Team",),
     "lab.seat.page.finding_page": ("FindingPage",),
     "lab.seat.page.teaching_page": ("SeatPage",),
     "lab.seat.run_progress": ("RunProgress",),

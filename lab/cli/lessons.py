@@ -27,16 +27,21 @@ def lesson_seat(
             progress.console.print(f"page: {shown.url}\nfrom another machine: {shown.hint}", soft_wrap=True)
             if not {"web", "terminal"} & {*names}:
                 shown.asks_nobody()
+        several = [name for name in names if name.startswith(deferred.PAGE_OF)]
+        pages = {name: stack.enter_context(deferred.SeatPage(wait_s=wait_s)) for name in several}
+        for name, one in pages.items():
+            progress.console.print(f"page of {name.removeprefix(deferred.PAGE_OF)}: {one.url}", soft_wrap=True)
+        team = stack.enter_context(deferred.Team(pages)) if pages else None
         prompt = deferred.TeachingPrompt(progress.console, plain=plain) if "terminal" in names else None
-        seat = deferred.LessonSeat(progress, prompt, shown, models)
+        seat = deferred.LessonSeat(progress, prompt, shown, models, team)
         stack.callback(seat.clear_scene)
         try:
             yield seat
             for model in models.values():
                 progress.console.print(str(model), soft_wrap=True)
         except LabError as error:
-            if shown is not None:
-                shown.finished(str(error))
+            for one in (*([] if shown is None else [shown]), *pages.values()):
+                one.finished(str(error))
             raise
 
 

@@ -104,6 +104,27 @@ class SeatPanel:
                 self.known.changed("question")
             return waited
 
+    @property
+    def attended(self) -> bool:
+        """Whether a browser has the seat."""
+        with self.lock:
+            return self.chair.holder is not None
+
+    def skip(self) -> None:
+        """Answer the question with "skip" for whoever has the seat."""
+        with self.lock:
+            if (pending := self.known.pending) is not None:
+                self._answer, self.known.pending = PageAnswer(pending.number, None, "skip"), None
+                self.known.changed("question")
+                self.lock.notify_all()
+
+    def hurry(self, until_s: float) -> None:
+        """Show until when [s of the clock] the question waits."""
+        with self.lock:
+            if (pending := self.known.pending) is not None and pending.until_s is None:
+                self.known.pending = replace(pending, until_s=until_s)
+                self.known.changed("question")
+
     def wait(self, pending: Pending) -> PageAnswer | None:
         """The answer to a question, or CLOSED after the server has ended; None after the question's time."""
         with self.lock:

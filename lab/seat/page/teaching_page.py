@@ -277,6 +277,29 @@ class SeatPage(LiveView):
         with self._panel.lock:
             self._panel.known.learning.known = self.spoken.about = known
 
+    # ---- one of several people
+
+    @property
+    def attended(self) -> bool:
+        """Whether somebody sits at the page."""
+        return self._panel.attended
+
+    def skip(self) -> None:
+        """Leave the pending question to the learner; called by any thread."""
+        self._panel.skip()
+        self._wake()
+
+    def hurry(self, until_s: float) -> None:
+        """Show until when [s of the monotonic clock] the pending question waits; called by any thread."""
+        self._panel.hurry(until_s)
+        self._wake()
+
+    def waits_for(self, names: Sequence[str]) -> None:
+        """Show who else is asked, while this page's person has answered; () for nobody."""
+        if [*names] != self._panel.known.waits_for:
+            self._show("waits_for", [*names])
+            self._wake()
+
     # ---- receipt, advisors, end
 
     def receipt(self, document: Mapping[str, Any]) -> None:
