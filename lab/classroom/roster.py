@@ -100,22 +100,22 @@ class Roster:
         return cls(folder, code, tuple(lessons), seed, most, typed_names)
 
     @classmethod
-    def read(cls, folder: Path) -> "Roster":
-        """The roster in a folder. Raises BadInput if there is none, or what is there is damaged."""
+    def read(cls, folder: Path, option: str = "--resume") -> "Roster":
+        """The roster in the folder that an option names. Raises BadInput if there is none, or what is there is damaged."""
         path = folder / FILE
+        where = f"class '{path}' ({option})"
         if not is_file(path):
             raise BadInput(
-                f"'{folder}' (--resume) holds no class: a folder with {FILE} is wanted, as lab class writes it"
+                f"'{folder}' ({option}) holds no class: a folder with {FILE} is wanted, as lab class writes it"
             )
         try:
             kept = TypeAdapter(_Kept).validate_json(read_limited(path, MOST_BYTES), strict=True)
         except OSError as error:
-            raise BadInput(f"class '{path}' (--resume): {error.strerror or error}") from None
+            raise BadInput(f"{where}: {error.strerror or error}") from None
         except ValidationError as error:
             why = error.errors(include_url=False)[0]
             at = ".".join(map(str, why["loc"]))
-            raise BadInput(f"class '{path}' (--resume): {at}: {why['msg']}: a file of lab class is wanted") from None
-        where = f"class '{path}' (--resume)"
+            raise BadInput(f"{where}: {at}: {why['msg']}: a file of lab class is wanted") from None
         lessons = tuple(lesson_from_json(options, where) for options in kept.lessons)
         for number, pupil in enumerate(kept.pupils, start=1):
             if pupil.number != number or clean_name(pupil.name) != pupil.name or not 0 <= pupil.lesson < len(lessons):
@@ -130,6 +130,10 @@ class Roster:
         write_whole(self.folder / FILE, (json.dumps(asdict(kept), indent=1) + "\n").encode())
 
     # ---- pupils
+
+    def lesson_folder(self, pupil: Pupil, lesson: int) -> Path:
+        """The folder of a pupil's lesson (from 0)."""
+        return self.folder / pupil.folder / f"lesson-{lesson + 1}"
 
     def join(self, code: str, name: str = "") -> tuple[Pupil, str] | None:
         """A new pupil and the key of their address; None for a wrong code. Raises Full.
