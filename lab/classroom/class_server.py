@@ -28,6 +28,7 @@ from uvicorn import Server as Uvicorn
 from websockets.exceptions import ConnectionClosed
 
 from lab.classroom.certificate import fingerprint, made_certificate
+from lab.classroom.class_lesson import title_of
 from lab.classroom.class_place import Place, files_of
 from lab.classroom.code_picture import code_svg
 from lab.classroom.room import OVER, RELOAD, PupilPage, Room
@@ -345,14 +346,11 @@ class ClassServer:
                 await asyncio.wait_for(stirred.wait(), 1.0)
 
     def _known(self) -> dict[str, Any]:
-        lessons = [
-            f"{options.subtask}{f' of {options.task}' if options.task else ''}" for options in self.roster.lessons
-        ]
         return {
             "code": self.roster.code,
             "join": self.join_url,
             "picture": self._picture,
-            "lessons": lessons,
+            "lessons": [title_of(lesson) for lesson in self.roster.lessons],
             "paused": self.room.paused,
             "most": self.roster.most,
         }

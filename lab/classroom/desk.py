@@ -19,7 +19,7 @@ from lab.classroom.desk_process import DeskOrder, sit
 
 Json = dict[str, Any]
 State = Literal["opening", "open", "over", "failed", "stopped", "lost"]
-KEPT = ("lesson", "place", "robot", "question", "curve", "standing", "notices", "members", "receipt", "ended")
+KEPT = ("lesson", "place", "robot", "question", "curve", "standing", "notices", "members", "work", "receipt", "ended")
 MOST_MESSAGE = 1 << 24  # bytes of the desk's messages
 PRELOADED = ["lab.classroom.desk_process", "lab.skills.prepared_scene", "lab.learning.kernels"]
 

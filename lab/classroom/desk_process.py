@@ -15,6 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from lab.advice.entries import FILE
+from lab.classroom.class_lesson import ClassLesson
+from lab.classroom.order_lesson import order_lesson
 from lab.errors import LabError
 from lab.files import is_file
 from lab.operating_system import own_session
@@ -22,6 +24,7 @@ from lab.plugins.code_file import files_taken
 from lab.seat.lesson_seat import LessonSeat
 from lab.seat.page.teaching_page import SeatPage
 from lab.seat.run_progress import RunProgress
+from lab.teaching.kept_order import OrderSessionOptions
 from lab.teaching.kept_session import KeptSession, check_new
 from lab.teaching.lesson import teach
 from lab.teaching.lesson_options import LessonOptions
@@ -42,7 +45,7 @@ class DeskOrder:
     teacher has named, so that a session that goes on may import them.
     """
 
-    options: LessonOptions
+    options: ClassLesson
     folder: Path
     toolbox: Path
     files: Mapping[str, tuple[str, str]] = field(default_factory=files_taken)
@@ -84,22 +87,28 @@ def _taught(order: DeskOrder, page: SeatPage) -> tuple[Any, ...]:
 
 
 def _lesson(order: DeskOrder, page: SeatPage) -> Mapping[str, Any]:
-    """The document of `lab teach --json`."""
+    """The document of `lab teach --json`, or of `lab sequence --json` for a lesson on an order."""
     take_again(order.files)
+    seat, toolbox = LessonSeat(RunProgress(EscapingConsole(quiet=True)), None, page), Toolbox(str(order.toolbox))
+    try:
+        if isinstance(order.options, OrderSessionOptions):
+            return order_lesson(order.options, order.folder, toolbox, seat)
+        return _table_lesson(order, order.options, toolbox, seat)
+    finally:
+        seat.clear_scene()
+
+
+def _table_lesson(order: DeskOrder, options: LessonOptions, toolbox: Toolbox, seat: LessonSeat) -> Mapping[str, Any]:
     kept = None
     if is_file(order.folder / FILE):
         kept = KeptSession(order.folder, "lab class --resume", trusted=order.modules)
+        options = kept.options
     else:
         check_new(order.folder)
-    options = order.options if kept is None else kept.options
-    seat = LessonSeat(RunProgress(EscapingConsole(quiet=True)), None, page)
-    try:
-        subject = subject_of(options, kept)
-        teacher = Teacher(Toolbox(str(order.toolbox)), options.advising(seat.people()), options.seed, seat.hear)
-        document = teach(subject, options, teacher, order.folder, kept)
-        seat.lesson_over(document)
-    finally:
-        seat.clear_scene()
+    subject = subject_of(options, kept)
+    teacher = Teacher(toolbox, options.advising(seat.people()), options.seed, seat.hear)
+    document = teach(subject, options, teacher, order.folder, kept)
+    seat.lesson_over(document)
     return document
 
 

@@ -6,6 +6,7 @@ from ipaddress import ip_address
 from pathlib import Path
 from typing import Any
 
+from lab.classroom.class_lesson import name_of
 from lab.classroom.class_place import Place
 from lab.classroom.class_server import ClassServer
 from lab.classroom.tile import COLUMNS
@@ -79,7 +80,7 @@ def closing(server: ClassServer) -> Json:
     pupils = server.call(server.room.tiles)
     return {
         "class": str(server.roster.folder),
-        "lessons": [options.subtask for options in server.roster.lessons],
+        "lessons": [name_of(lesson) for lesson in server.roster.lessons],
         "seed": server.roster.seed,
         "pupils": [
             {name: tile[name] for name in ("number", "name", "lesson", "state", "text")} for tile in pupils.values()

@@ -12,14 +12,13 @@ from typing import Any
 
 from lab.classroom.desk import Desk, processes
 from lab.classroom.desk_process import DeskOrder
+from lab.classroom.kept_lesson import KEPT, kept_lesson
 from lab.classroom.roster import Pupil, Roster
 from lab.classroom.tile import best_first, row_of, tile_of
-from lab.errors import BadInput, LabError
-from lab.files import is_file, json_of, read_limited, write_whole
+from lab.errors import BadInput
+from lab.files import is_file, write_whole
 
 Json = dict[str, Any]
-KEPT = "lesson.json"  # beside the journal of a finished lesson: its document, and the last state of its page
-MOST_BYTES = 1 << 24
 MOST_HINT = 200  # characters
 # codes with which a page is closed: the class has ended; load again; another page of the pupil is open
 OVER, RELOAD, REPLACED = 1001, 4001, 4002
@@ -77,7 +76,7 @@ class Room:
 
     def folder(self, pupil: Pupil, lesson: int) -> Path:
         """The folder of a pupil's lesson (from 0)."""
-        return self.roster.folder / pupil.folder / f"lesson-{lesson + 1}"
+        return self.roster.lesson_folder(pupil, lesson)
 
     def seat(self, pupil: Pupil) -> None:
         """Open the desk of a pupil at the pupil's lesson: the lesson begins, goes on, or is shown if it is over."""
@@ -87,7 +86,7 @@ class Room:
         before = self.desks.get(pupil.number)
         desk = self.desks[pupil.number] = Desk(order)
         desk.on_news = lambda: self._stirred(pupil.number, desk)
-        kept = self._kept(order.folder)
+        kept = kept_lesson(order.folder)
         if kept is not None:
             desk.state, desk.result, desk.parts = "over", kept["document"], kept["page"]
             desk.ready.set()
@@ -129,16 +128,6 @@ class Room:
             if self._lost[lesson] <= MOST_LOST:
                 self.open_again(number)
         self.on_news()
-
-    def _kept(self, folder: Path) -> Json | None:
-        path = folder / KEPT
-        if not is_file(path):
-            return None
-        with suppress(LabError, ValueError, KeyError, TypeError):
-            kept = json_of(read_limited(path, MOST_BYTES))
-            if isinstance(kept["document"], dict) and isinstance(kept["page"], dict):
-                return dict(kept)
-        return None
 
     # ---- pupils' pages
 
@@ -276,6 +265,6 @@ class Room:
             result = self.desks[pupil.number].result
             return None if result is None else dict(result)
         if (pupil.number, lesson) not in self._finished:
-            kept = self._kept(self.folder(pupil, lesson))
+            kept = kept_lesson(self.folder(pupil, lesson))
             self._finished[pupil.number, lesson] = None if kept is None else dict(kept["document"])
         return self._finished[pupil.number, lesson]

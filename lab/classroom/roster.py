@@ -16,9 +16,9 @@ import numpy as np
 from annotated_types import Ge, Le, MinLen
 from pydantic import StringConstraints, TypeAdapter, ValidationError
 
+from lab.classroom.class_lesson import ClassLesson, lesson_from_json, lesson_to_json
 from lab.errors import BadInput
 from lab.files import is_file, read_limited, write_whole
-from lab.teaching.lesson_options import LessonOptions
 
 FILE = "class.json"
 FORMAT: Final = "teaching-lab class 1"
@@ -27,7 +27,6 @@ MOST_PUPILS = 60
 NAME_LENGTH = 24
 LETTERS = "23456789abcdefghjkmnpqrstuvwxyz"  # without those that look alike
 CODE_LENGTH = 6
-ADVISORS = ("web",)  # of every lesson
 NAMES = 37  # part of the seed of pseudonyms
 COLOURS = (
     *("amber", "azure", "black", "blue", "bronze", "brown", "copper", "coral", "golden", "green", "grey", "indigo"),
@@ -82,7 +81,7 @@ class Roster:
 
     folder: Path
     code: str
-    lessons: tuple[LessonOptions, ...]
+    lessons: tuple[ClassLesson, ...]
     seed: int = 0
     most: int = MOST_PUPILS
     typed_names: bool = False
@@ -91,7 +90,7 @@ class Roster:
     modules: tuple[str, ...] = ()
 
     @classmethod
-    def new(cls, folder: Path, lessons: Sequence[LessonOptions], seed: int, most: int, typed_names: bool) -> "Roster":
+    def new(cls, folder: Path, lessons: Sequence[ClassLesson], seed: int, most: int, typed_names: bool) -> "Roster":
         """The roster of a new class, which is not written yet. Raises BadInput for a folder that holds a class."""
         if is_file(folder / FILE):
             raise BadInput(
@@ -101,28 +100,23 @@ class Roster:
         return cls(folder, code, tuple(lessons), seed, most, typed_names)
 
     @classmethod
-    def read(cls, folder: Path) -> "Roster":
-        """The roster in a folder. Raises BadInput if there is none, or what is there is damaged."""
+    def read(cls, folder: Path, option: str = "--resume") -> "Roster":
+        """The roster in the folder that an option names. Raises BadInput if there is none, or what is there is damaged."""
         path = folder / FILE
+        where = f"class '{path}' ({option})"
         if not is_file(path):
             raise BadInput(
-                f"'{folder}' (--resume) holds no class: a folder with {FILE} is wanted, as lab class writes it"
+                f"'{folder}' ({option}) holds no class: a folder with {FILE} is wanted, as lab class writes it"
             )
         try:
             kept = TypeAdapter(_Kept).validate_json(read_limited(path, MOST_BYTES), strict=True)
         except OSError as error:
-            raise BadInput(f"class '{path}' (--resume): {error.strerror or error}") from None
+            raise BadInput(f"{where}: {error.strerror or error}") from None
         except ValidationError as error:
             why = error.errors(include_url=False)[0]
             at = ".".join(map(str, why["loc"]))
-            raise BadInput(f"class '{path}' (--resume): {at}: {why['msg']}: a file of lab class is wanted") from None
-        where = f"class '{path}' (--resume)"
-        lessons = tuple(LessonOptions.from_json(options, where) for options in kept.lessons)
-        for options in lessons:
-            if options.advisors != ADVISORS:
-                raise BadInput(
-                    f"{where}: lesson '{options.subtask}' has the advisors {options.advisors}: pupils advise: {ADVISORS}"
-                )
+            raise BadInput(f"{where}: {at}: {why['msg']}: a file of lab class is wanted") from None
+        lessons = tuple(lesson_from_json(options, where) for options in kept.lessons)
         for number, pupil in enumerate(kept.pupils, start=1):
             if pupil.number != number or clean_name(pupil.name) != pupil.name or not 0 <= pupil.lesson < len(lessons):
                 raise BadInput(f"{where}: pupil {number} is {asdict(pupil)}: a file of lab class is wanted")
@@ -131,11 +125,15 @@ class Roster:
     def write(self) -> None:
         """Write the roster, whose folder is made if it is missing. Raises OSError."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        lessons = [options.to_json() for options in self.lessons]
+        lessons = [lesson_to_json(lesson) for lesson in self.lessons]
         kept = _Kept(FORMAT, self.code, lessons, self.seed, self.most, self.typed_names, self.port, self.pupils)
         write_whole(self.folder / FILE, (json.dumps(asdict(kept), indent=1) + "\n").encode())
 
     # ---- pupils
+
+    def lesson_folder(self, pupil: Pupil, lesson: int) -> Path:
+        """The folder of a pupil's lesson (from 0)."""
+        return self.folder / pupil.folder / f"lesson-{lesson + 1}"
 
     def join(self, code: str, name: str = "") -> tuple[Pupil, str] | None:
         """A new pupil and the key of their address; None for a wrong code. Raises Full.

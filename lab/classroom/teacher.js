@@ -45,7 +45,8 @@ function showTiles(tiles) {
 }
 
 const HEADS = [
-  ["lesson", "Lesson"], ["name", "Pupil"], ["solved", "Goal reached"], ["final_steps", "Steps at the end"], ["optimal_steps", "Fewest possible"], ["episodes", "Episodes"],
+  ["lesson", "Lesson"], ["name", "Pupil"], ["solved", "Goal reached"], ["final_steps", "Steps at the end"], ["optimal_steps", "Fewest possible"],
+  ["cost", "Best order"], ["optimal_cost", "Proven optimum"], ["episodes", "Episodes"],
   ["answers", "Answers"], ["own_choice_too", "Its own choice, too"], ["not_best", "Not the best"], ["misleads", "Did not help"], ["believed", "Believed to the end"], ["tau", "Skill (tau)"],
 ];
 const shown = (value) => (value === null ? "" : value === true ? "yes" : value === false ? "no" : typeof value === "number" && !Number.isInteger(value) ? value.toFixed(2) : String(value));
@@ -57,9 +58,10 @@ function showRows(rows) {
     made.append(...cells.map((text) => make(kind, text)));
     return made;
   };
-  el("report").querySelector("thead").replaceChildren(line(HEADS.map(([, head]) => head), "th"));
+  const heads = HEADS.filter(([name]) => rows.some((row) => row[name] !== null));
+  el("report").querySelector("thead").replaceChildren(line(heads.map(([, head]) => head), "th"));
   el("report").querySelector("tbody").replaceChildren(...rows.map((row, k) => {
-    const made = line(HEADS.map(([name]) => shown(row[name])), "td");
+    const made = line(heads.map(([name]) => shown(row[name])), "td");
     if (row.solved && (k === 0 || rows[k - 1].lesson !== row.lesson)) made.className = "first";
     return made;
   }));

@@ -4,6 +4,7 @@
 const classTile = (() => {
   const SVG = "http://www.w3.org/2000/svg", WIDE = 240, HIGH = 64, LONG_S = 60;
   const STATES = { opening: "opens", open: "", over: "done", failed: "failed", stopped: "stopped", lost: "its process has ended" };
+  const ENDS = { steps: ["did not reach its goal", "reached its goal"], order: ["its order is not proven the best", "found a best order"] };
   const VERDICTS = { rejected: "dropped: its advice misled", converged: "needs no more advice", left: "works alone" };
 
   function make(name, text, kind) {
@@ -21,12 +22,12 @@ const classTile = (() => {
     return made;
   }
 
-  // The means of the episodes, guided ones orange, and the fewest steps possible as a line
-  function curve({ curve: means, guided, optimal }) {
+  // The means of the episodes, guided ones orange, and the fewest steps possible, or the proven bound of an order, as a line
+  function curve({ curve: means, guided, optimal, kind }) {
     const svg = document.createElementNS(SVG, "svg");
     svg.setAttribute("viewBox", `0 0 ${WIDE} ${HIGH}`);
     svg.setAttribute("role", "img");
-    svg.setAttribute("aria-label", means.length ? `steps an episode, lately ${Math.round(means[means.length - 1])}` : "no episode yet");
+    svg.setAttribute("aria-label", means.length ? `${kind === "order" ? "cost of an episode's order" : "steps an episode"}, lately ${Math.round(means[means.length - 1])}` : "no episode yet");
     const top = Math.log(Math.max(2, ...means)), low = Math.log(Math.max(1, Math.min(optimal || 1, ...means)));
     const y = (steps) => HIGH - 4 - ((Math.log(Math.max(1, steps)) - low) / Math.max(1e-9, top - low)) * (HIGH - 8);
     const x = (k) => 3 + (k * (WIDE - 6)) / Math.max(1, means.length - 1);
@@ -41,8 +42,10 @@ const classTile = (() => {
     return svg;
   }
 
+  const best = ({ kind, best: least, optimal }) => (kind !== "order" || least === null ? "" : `; best order ${Math.round(least)}${optimal ? `, bound ${Math.round(optimal)}` : ""}`);
+
   function status(tile) {
-    if (tile.state !== "open") return [`${STATES[tile.state]}${tile.text ? `: ${tile.text}` : ""}${tile.state === "over" ? (tile.solved ? ": reached its goal" : ": did not reach its goal") : ""}`, tile.state];
+    if (tile.state !== "open") return [`${STATES[tile.state]}${tile.text ? `: ${tile.text}` : ""}${tile.state === "over" ? `: ${ENDS[tile.kind][Number(tile.solved)]}` : ""}`, tile.state];
     if (!tile.here && tile.asks) return ["asks, and nobody is there", "away"];
     if (tile.asks) return [`asks${tile.asked_s >= LONG_S ? `, waits ${Math.floor(tile.asked_s / 60)} min` : ""}`, tile.asked_s >= LONG_S ? "stuck" : "asks"];
     return [VERDICTS[tile.verdict] || "works alone", tile.verdict === "rejected" ? "dropped" : ""];
@@ -87,7 +90,7 @@ const classTile = (() => {
     parts.here.textContent = parts.here.className = tile.here ? "here" : "away";
     parts.says.textContent = says;
     const answers = `${tile.taken} answered${tile.skipped ? `, ${tile.skipped} left to it` : ""}${tile.misleads ? `, ${tile.misleads} did not help` : ""}`;
-    parts.facts.textContent = `${tile.title || "no lesson yet"}: episode ${tile.episode}${tile.episodes ? ` of ${tile.episodes}` : ""}; ${answers}`;
+    parts.facts.textContent = `${tile.title || "no lesson yet"}: episode ${tile.episode}${tile.episodes ? ` of ${tile.episodes}` : ""}; ${answers}${best(tile)}`;
     parts.hint.textContent = tile.hint ? `Hint: ${tile.hint}` : "";
     parts.look.href = `/desk/${location.search}&pupil=${tile.number}`;
     parts.help.textContent = tile.helped ? "Give back" : "Help";

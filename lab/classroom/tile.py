@@ -11,6 +11,7 @@ MOST_POINTS = 60  # of a tile's curve
 COLUMNS = (
     *("pupil", "name", "lesson", "skill", "state", "episodes", "solved", "final_steps", "optimal_steps"),
     *("answers", "own_choice_too", "not_best", "helped_steps", "guided_episodes", "misleads", "believed", "tau"),
+    *("cost", "optimal_cost", "objective"),  # of a lesson on an order
 )
 
 
@@ -28,7 +29,9 @@ def tile_of(pupil: Pupil, desk: Desk, here: bool, asked_s: float | None) -> Json
         "text": desk.text,
         "episode": curve.get("count", 0),
         "episodes": lesson.get("episodes", 0),
+        "kind": lesson.get("kind", "steps"),
         "optimal": lesson.get("optimal"),
+        "best": (curve.get("best") or [None])[0],
         "curve": _thinned(curve.get("means", [])),
         "guided": _thinned(curve.get("guided", [])),
         "asks": question["title"] if question else "",
@@ -37,43 +40,55 @@ def tile_of(pupil: Pupil, desk: Desk, here: bool, asked_s: float | None) -> Json
         "skipped": standing.get("skipped", 0),
         "misleads": standing.get("misleads", 0),
         "verdict": standing.get("verdict", ""),
-        "solved": None if desk.result is None else bool(desk.result["solved"]),
+        "solved": None if desk.result is None else is_solved(desk.result),
     }
 
 
 def row_of(pupil: Pupil, lesson: int, result: Mapping[str, Any]) -> Json:
-    """The row of a pupil's finished lesson (from 0), from its document; what is not known is None."""
+    """The row of a pupil's finished lesson (from 0), from its document; what is not known, or does not apply, is None."""
     receipt = result.get("receipt") or {}
     skill = receipt.get("skill") or {}
-    return {
+    advice = (result.get("advice") or [{}])[0] if is_order(result) else result
+    known = {
         "pupil": pupil.number,
         "name": pupil.name,
         "lesson": lesson + 1,
-        "skill": result["skill"],
+        "skill": f"order of {result['task']}" if is_order(result) else result["skill"],
         "state": "over",
         "episodes": result["episodes"],
-        "solved": result["solved"],
-        "final_steps": result["final_steps"],
-        "optimal_steps": result["optimal_steps"],
+        "solved": is_solved(result),
         "answers": receipt.get("taken"),
         "own_choice_too": receipt.get("agreed"),
         "not_best": receipt.get("against_best"),
-        "helped_steps": result["helped_steps"],
-        "guided_episodes": len(result["guided_episodes"]),
-        "misleads": result["misleads"],
-        "believed": result["rejected_at_episode"] is None,
+        "helped_steps": advice.get("helped_steps"),
+        "guided_episodes": receipt.get("guided") if is_order(result) else len(result["guided_episodes"]),
+        "misleads": advice.get("misleads"),
+        "believed": advice.get("rejected_at_episode") is None,
         "tau": skill.get("tau"),
     }
+    own = ("cost", "optimal_cost", "objective") if is_order(result) else ("final_steps", "optimal_steps")
+    return dict.fromkeys(COLUMNS) | known | {name: result[name] for name in own}
+
+
+def is_order(result: Mapping[str, Any]) -> bool:
+    """Whether a lesson's document is that of advice on an order, as `lab sequence --json` gives it."""
+    return "best_sequence" in result
+
+
+def is_solved(result: Mapping[str, Any]) -> bool:
+    """Whether a lesson reached its goal; one on an order did if its own order is proven optimal."""
+    return result["optimal_cost"] is not None and result["gap"] == 0.0 if is_order(result) else bool(result["solved"])
 
 
 def best_first(rows: list[Json]) -> list[Json]:
-    """The rows of one lesson, best teacher first: a solved lesson, the shortest way, then the fewest answers."""
+    """The rows of one lesson, best teacher first: a solved lesson, the shortest way or order, then the fewest answers."""
     far = float("inf")
     return sorted(
         rows,
         key=lambda row: (
             not row["solved"],
             far if row["final_steps"] is None else row["final_steps"],
+            far if row["cost"] is None else row["cost"],
             far if row["answers"] is None else row["answers"],
             row["pupil"],
         ),

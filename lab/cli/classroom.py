@@ -18,7 +18,7 @@ def hold_class(
         list[str] | None,
         typer.Argument(
             help="The lessons, in their order: whatever lab teach takes as SUBTASK: {skills}, a world, gym:ID, "
-            "./mine.py:Problem, {problems}.",
+            "./mine.py:Problem, {problems}; or order:TASK, advice on an order, as lab sequence TASK asks for it.",
             metavar="LESSON...",
             autocompletion=offers("skills", "problems"),
             callback=from_files("problems"),
@@ -76,7 +76,7 @@ def hold_class(
         roster.modules = tuple(trust_module or ())
     else:
         roster = _new(lessons or [], out, pupils, typed_names, seed, (task, learner, gate, episodes))
-        roster.modules = tuple(filter(None, map(_module, roster.lessons)))
+        roster.modules = tuple(filter(None, map(deferred.module_of, roster.lessons)))
     _check(roster)
     place = deferred.place_of(lan, name or (), certificate, key)
     said = console()
@@ -101,8 +101,11 @@ def _new(
     if out is None:
         raise BadInput("--out is missing: the folder in which the class is kept, such as --out monday")
     task, learner, gate, episodes = options
-    wanted = []
+    wanted: list[deferred.ClassLesson] = []
     for lesson in lessons:
+        if lesson.startswith(deferred.ORDER_LESSON):
+            wanted.append(deferred.order_lesson_named(lesson, gate, episodes, seed))
+            continue
         is_skill = lesson in deferred.SKILLS
         of = deferred.LessonOptions(
             lesson, task if is_skill else None, None, learner, gate, None, deferred.PUPILS, episodes=episodes, seed=seed
@@ -111,20 +114,15 @@ def _new(
     return deferred.Roster.new(out, wanted, seed, pupils, typed_names)
 
 
-def _module(lesson: "deferred.LessonOptions") -> str:
-    """The module that a lesson such as gym:MODULE:ID would import, "" for none."""
-    return deferred.parse_name(lesson.subtask, "LESSON").module if lesson.subtask.startswith("gym:") else ""
-
-
 def _check(roster: "deferred.Roster") -> None:
     """Check every lesson before anybody joins. Raises BadInput, also for code that is named in the class's file alone."""
     for lesson in roster.lessons:
-        if (module := _module(lesson)) and module not in roster.modules:
+        if (module := deferred.module_of(lesson)) and module not in roster.modules:
             raise BadInput(
                 f"class '{roster.folder}' names the module '{module}', whose code would run: if you trust whoever made it, "
                 f"say --trust-module {module}"
             )
-        deferred.subject_of(lesson)
+        deferred.check_lesson(lesson)
 
 
 def _summary(document: dict[str, Any]) -> Any:

@@ -11,10 +11,12 @@ if TYPE_CHECKING:
     from lab.api.scenes import SceneRequest as SceneAsked
     from lab.api.scenes import seen
     from lab.audit.audit import audit, kept_evidence
+    from lab.classroom.class_lesson import ADVISORS as PUPILS
+    from lab.classroom.class_lesson import ORDER as ORDER_LESSON
+    from lab.classroom.class_lesson import ClassLesson, check_lesson, module_of, order_lesson_named
     from lab.classroom.class_server import ClassServer
     from lab.classroom.code_picture import code_text
     from lab.classroom.holding import attend, begun_words, closing, place_of
-    from lab.classroom.roster import ADVISORS as PUPILS
     from lab.classroom.roster import Roster
     from lab.export import FORMATS
     from lab.export.commands import Path as Lines
@@ -36,6 +38,7 @@ if TYPE_CHECKING:
     from lab.production.operation.commands import Done, pace
     from lab.production.operation.desk import Desk, RunDesk
     from lab.production.operation.operation import Operation
+    from lab.production.order_session import sequenced
     from lab.production.publication import CARD, publish, write_card
     from lab.production.report import write_files
     from lab.production.run import remember
@@ -44,7 +47,6 @@ if TYPE_CHECKING:
     from lab.production.run_journal import RunEnded, RunJournal, is_run, replayed_run
     from lab.production.run_options import RunOptions, begun, kept_task
     from lab.production.run_options import gone_on as run_gone_on
-    from lab.production.sequencing_job import SequencingOptions, sequence_named
     from lab.seat.language_model import language_models
     from lab.seat.lesson_seat import LessonSeat
     from lab.seat.page.finding_page import FindingPage
@@ -147,10 +149,18 @@ TABLE = {
     "lab.advice.panel": ("ASKED", "DECISIONS"),
     "lab.api.scenes": ("SceneRequest as SceneAsked", "seen"),
     "lab.audit.audit": ("audit", "kept_evidence"),
+    "lab.classroom.class_lesson": (
+        "ADVISORS as PUPILS",
+        "check_lesson",
+        "ClassLesson",
+        "module_of",
+        "ORDER as ORDER_LESSON",
+        "order_lesson_named",
+    ),
     "lab.classroom.class_server": ("ClassServer",),
     "lab.classroom.code_picture": ("code_text",),
     "lab.classroom.holding": ("attend", "begun_words", "closing", "place_of"),
-    "lab.classroom.roster": ("ADVISORS as PUPILS", "Roster"),
+    "lab.classroom.roster": ("Roster",),
     "lab.export": ("FORMATS",),
     "lab.export.commands": ("Path as Lines",),
     "lab.export.program": ("Options", "POSITIONS", "Program"),
@@ -171,13 +181,13 @@ TABLE = {
     "lab.production.operation.commands": ("Done", "pace"),
     "lab.production.operation.desk": ("Desk", "RunDesk"),
     "lab.production.operation.operation": ("Operation",),
+    "lab.production.order_session": ("sequenced",),
     "lab.production.publication": ("CARD", "publish", "write_card"),
     "lab.production.report": ("write_files",),
     "lab.production.run": ("remember", "run as run_task"),
     "lab.production.run_advice": ("RunAdvice",),
     "lab.production.run_journal": ("is_run", "replayed_run", "RunEnded", "RunJournal"),
     "lab.production.run_options": ("begun", "kept_task", "gone_on as run_gone_on", "RunOptions"),
-    "lab.production.sequencing_job": ("sequence_named", "SequencingOptions"),
     "lab.seat.language_model": ("language_models",),
     "lab.seat.lesson_seat": ("LessonSeat",),
     "lab.seat.team": ("Team",),

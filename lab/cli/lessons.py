@@ -1,10 +1,9 @@
 """The shared code of the commands that teach: the seat, the teacher, and the notices of a kept session."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from lab.cli import deferred
 from lab.cli.output import complain, console
@@ -59,40 +58,6 @@ def teacher_of(
     for journal in advising.cut_records():
         _say_cut(journal)
     return deferred.Teacher(box, advising, options.seed, seat.hear)
-
-
-def sequenced(
-    kept: "deferred.OrderSession",
-    people: "Mapping[str, deferred.Ask]",
-    seat: "deferred.LessonSeat",
-    toolbox: str | None,
-    files: dict[str, Path],
-) -> dict[str, Any]:
-    """The document of a session of `lab sequence`; people: who is asked, by names such as "terminal"; files: its pictures."""
-    options = kept.options
-    wanted = deferred.SequencingOptions(
-        method=options.method,
-        episodes=options.episodes,
-        objective=options.objective,
-        sessions=options.sessions,
-        seed=options.seed,
-        stochastic=options.stochastic,
-        advisor=options.asked,
-        gate=options.gate,
-        people=people,
-        keep=kept.keep,
-        parts=options.parts,
-        durations=kept.durations(),
-        layout=options.beside.layout,
-        robots=options.robots,
-        policy=None if options.policy is None else Path(options.policy),
-        seconds=options.seconds,
-        gap=options.gap,
-        practice=options.practice,
-        keep_policy=options.keep_policy,
-    )
-    teacher = teacher_of(toolbox, deferred.LessonOptions(advisors=deferred.DEFAULT_ADVISORS, seed=options.seed), seat)
-    return deferred.sequence_named(options.task, options.case, options.toasts, wanted, teacher=teacher, files=files)
 
 
 def _say_cut(read: "deferred.Read") -> None:

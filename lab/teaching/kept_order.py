@@ -97,12 +97,16 @@ class OrderSession(SessionInFolder):
         *,
         read_only: bool = False,
         durations: Mapping[str, Any] | None = None,
+        out: Path | None = None,
     ) -> None:
-        """durations: for a new session of a run, those that the run plans with; they are stored beside the journal."""
+        """durations: for a new session of a run, those that the run plans with; they are stored beside the journal.
+
+        out: the folder of a new session, by default one in the toolbox.
+        """
         self.options: OrderSessionOptions = options
         self._durations = durations
         self.read = read
-        self._toolbox, self._read_only = toolbox, read_only
+        self._toolbox, self._read_only, self._out = toolbox, read_only, out
         self.folder = None if read is None else read.path.parent
 
     def durations(self) -> Mapping[str, Any] | None:
@@ -122,7 +126,7 @@ class OrderSession(SessionInFolder):
         signature, read = signature_of(cell, objective), self.read
         if read is None:
             name = f"order of {Path(self.options.task).stem}"
-            self.folder = claimed(self._toolbox, name, Path.mkdir)
+            self.folder = claimed(self._toolbox, name, Path.mkdir) if self._out is None else self._out
             if self._durations is not None:
                 write_whole(self.folder / DURATIONS, json.dumps(dict(self._durations), indent=1) + "\n")
             head = SessionEntry(self.options.to_json(), name, signature, __version__, command="sequence")

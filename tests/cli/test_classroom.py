@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from lab.classroom.roster import ADVISORS, FILE, Roster
+from lab.classroom.class_lesson import ADVISORS
+from lab.classroom.roster import FILE, Roster
 from lab.teaching.lesson_options import LessonOptions
 
 Lab = Callable[..., Any]
@@ -24,6 +25,10 @@ Lab = Callable[..., Any]
         (["--resume", "y"], "holds no class"),
         (["world-1", "--out", "x", "--pupils", "0"], "--pupils"),
         (["world-1", "--out", "x", "--gate", "ccr"], "ccr"),
+        (["order:nothing", "--out", "x"], "nothing"),
+        (["order:", "--out", "x"], "nothing to sequence"),
+        (["order:world-1", "--out", "x"], "nothing to sequence"),
+        (["world-1", "order:toast-case-1", "--out", "x", "--gate", "ia"], "'ia' (--gate)"),
         (["world-1", "--out", "x", "--lan", "0.0.0.0"], "every address"),
         (["world-1", "--out", "x", "--name", "lab.example"], "--lan"),
         (["world-1", "--out", "x", "--lan", "127.0.0.1", "--certificate", "c.pem"], "--key"),
