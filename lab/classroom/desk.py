@@ -1,4 +1,4 @@
-"""A pupil's desk as the class's server sees it: the process with the lesson, and what its page shows.
+"""A desk as the class's server sees it: the process with the lesson, and what its page shows.
 
 The server is one of the pages of the desk's process: it only watches, and knows all parts of the document.
 """
@@ -37,7 +37,8 @@ class Desk:
     """The process of one lesson, and its state; all methods are called in the server's event loop.
 
     on_news: called when the shown document or the state has changed.
-    parts: the newest parts of the page's document. result: the lesson's document, once it is over. text: why it failed.
+    parts: the newest parts of the page's document, of a team that of the one who is first. questions: the pending questions by
+    the names of those who teach together, "" for one pupil alone. result: the lesson's document, once it is over. text: why it failed.
     """
 
     def __init__(self, order: DeskOrder) -> None:
@@ -48,11 +49,12 @@ class Desk:
         self.result: Mapping[str, Any] | None = None
         self.text = ""
         self.ready = asyncio.Event()  # the page answers, or never will
-        self._address = ""
+        self.questions: dict[str, Json] = {}
+        self._addresses: dict[str, str] = {}
         self._loop = asyncio.get_running_loop()
         self._pipe: Connection | None = None
         self._process: Any = None
-        self._watching: asyncio.Task[None] | None = None
+        self._watching: list[asyncio.Task[None]] = []
         self._turn, self._closed = asyncio.Lock(), False
 
     async def open(self, context: Any) -> None:
@@ -72,9 +74,9 @@ class Desk:
         """End the process: the lesson is interrupted, and its journal holds every answer. Safe to call again."""
         self._closed = True
         async with self._turn:
-            if self._watching is not None:
-                self._watching.cancel()
-                await asyncio.gather(self._watching, return_exceptions=True)
+            for watching in self._watching:
+                watching.cancel()
+            await asyncio.gather(*self._watching, return_exceptions=True)
             pipe, self._pipe = self._pipe, None
             if pipe is not None:
                 with suppress(OSError):
@@ -83,12 +85,17 @@ class Desk:
                 await asyncio.to_thread(self._process.join)
         self.ready.set()
 
-    async def page(self, watches: bool = False) -> ClientConnection:
-        """A further page of the process; watches: it never gets the seat by itself. Raises OSError if the process has ended."""
+    async def page(self, watches: bool = False, name: str = "") -> ClientConnection:
+        """A further page of the process; watches: it never gets the seat by itself. Raises OSError if the process has ended.
+
+        name: of one of those who teach together; whoever is not among them watches the page of the one who is first.
+        """
         await self.ready.wait()
-        if not self._address:
+        if not self._addresses:
             raise OSError("the desk's process has ended")
-        address = f"{self._address}&watch" if watches else self._address
+        address = self._addresses.get(name)
+        if address is None or watches:
+            address = f"{address or next(iter(self._addresses.values()))}&watch"
         try:
             return await connect(address, max_size=MOST_MESSAGE, compression=None, proxy=None)
         except (WebSocketException, EOFError) as error:  # killed while it answered
@@ -107,11 +114,13 @@ class Desk:
 
     def _hear(self, said: tuple[Any, ...]) -> None:
         match said:
-            case ("page", int(port), str(token)):
-                self._address = f"ws://127.0.0.1:{port}/frames?token={token}"
+            case ("pages", dict(pages)):
+                self._addresses = {
+                    name: f"ws://127.0.0.1:{port}/frames?token={token}" for name, (port, token) in pages.items()
+                }
                 self.state = "open"
                 self.ready.set()
-                self._watching = asyncio.create_task(self._watch())
+                self._watching = [asyncio.create_task(self._watch(name)) for name in self._addresses]
             case ("over", document):
                 self.state, self.result = "over", document
             case ("failed" | "stopped" as how, str(text)):
@@ -122,16 +131,27 @@ class Desk:
         """The process has ended; if nobody asked it to, it was killed."""
         if self.state in ("opening", "open"):
             self.state, self.text = "lost", "its process has ended"
-        self._address = ""
+        self._addresses = {}
+        self.questions.clear()
         self.ready.set()
         self.on_news()
 
-    async def _watch(self) -> None:
-        """Take over the parts of the document as they change."""
+    async def _watch(self, name: str) -> None:
+        """Take over the parts of a page's document as they change; of all pages but the first, only the question."""
+        kept = KEPT if name == next(iter(self._addresses)) else ("question",)
         with suppress(OSError, ConnectionClosed):
-            async with await self.page(watches=True) as page:
+            async with await self.page(watches=True, name=name) as page:
                 async for message in page:
                     parts = json.loads(message).get("seat", {})
-                    if new := {part: parts[part] for part in KEPT if part in parts}:
+                    if not (new := {part: parts[part] for part in kept if part in parts}):
+                        continue
+                    if "question" in new:
+                        self._pose(name, new["question"])
+                    if kept is KEPT:
                         self.parts |= new
-                        self.on_news()
+                    self.on_news()
+
+    def _pose(self, name: str, question: Json | None) -> None:
+        self.questions.pop(name, None)
+        if question is not None:
+            self.questions[name] = question

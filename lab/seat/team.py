@@ -116,6 +116,3 @@ def _answer(page: "SeatPage", request: Request) -> Reply:
         raise AdvisorLeft("quit") from None
 
 
-def names_of(people: Sequence[str]) -> list[str]:
-    """The advisors' names of people."""
-    return [PAGE_OF + name for name in people]
