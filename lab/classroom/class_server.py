@@ -11,7 +11,7 @@ import ssl
 import threading
 import time
 from collections import deque
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -23,13 +23,15 @@ from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import HTTPConnection, Request
 from starlette.responses import JSONResponse, PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
-from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
+from starlette.websockets import WebSocket, WebSocketDisconnect
 from uvicorn import Server as Uvicorn
 from websockets.exceptions import ConnectionClosed
 
+from lab.classroom.browser_socket import closer, sender
 from lab.classroom.certificate import fingerprint, made_certificate
 from lab.classroom.class_lesson import title_of
 from lab.classroom.class_place import Place, files_of
+from lab.classroom.class_report import HAND_OUTS, POLICY, REPORT, page_now
 from lab.classroom.code_picture import code_svg
 from lab.classroom.room import OVER, RELOAD, PupilPage, Room
 from lab.classroom.roster import Full, Roster
@@ -49,6 +51,7 @@ WRONG, WRONG_S = 20, 60.0  # wrong codes that an address may try in so many seco
 MOST_ADDRESSES = 1000
 MOST_BODY = 2048  # bytes of a request to join
 FREE = '"free": true'  # in a message about the seat
+FRAMED_NOWHERE = f"{POLICY}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 
 
 class ClassServer:
@@ -146,6 +149,8 @@ class ClassServer:
         routes = [
             Route("/join", self._join, methods=["POST"]),
             Route("/teacher/class.csv", self._table),
+            Route(f"/teacher/{REPORT}", self._report),
+            Route(f"/teacher/{HAND_OUTS}", self._report),
             WebSocketRoute("/teacher/frames", self._teach),
             WebSocketRoute("/desk/frames", self._sit),
             Route("/{room}/", self._file),
@@ -167,6 +172,13 @@ class ClassServer:
         if not self._is_teacher(request):
             return PlainTextResponse("This page needs the token of the teacher's address.\n", 403)
         return Response(csv_of(self.room.rows(), COLUMNS), media_type="text/csv")
+
+    async def _report(self, request: Request) -> Response:
+        """The report or the hand-outs of the class at this moment."""
+        if not self._is_teacher(request):
+            return PlainTextResponse("This page needs the token of the teacher's address.\n", 403)
+        page = await asyncio.to_thread(page_now, self.roster, request.url.path.rpartition("/")[2])
+        return Response(page, headers={"Content-Security-Policy": FRAMED_NOWHERE}, media_type="text/html")
 
     # ---- who may
 
@@ -378,24 +390,3 @@ class ClassServer:
                     raise BadInput("that was no message of this page")
         except (BadInput, ValueError, RecursionError) as error:
             await sender(browser)(json.dumps({"refusal": str(error)}))
-
-
-def sender(browser: WebSocket) -> Callable[[str | bytes], Awaitable[None]]:
-    """A function that sends text to a browser, and does nothing once that has left."""
-
-    async def send(text: str | bytes) -> None:
-        with suppress(WebSocketDisconnect, RuntimeError):
-            await browser.send_text(text if isinstance(text, str) else text.decode())
-
-    return send
-
-
-def closer(browser: WebSocket) -> Callable[[int], Awaitable[None]]:
-    """A function that closes a browser's connection with a code."""
-
-    async def close(code: int) -> None:
-        with suppress(WebSocketDisconnect, RuntimeError):
-            if browser.application_state is WebSocketState.CONNECTED:
-                await browser.close(code, "the class has ended" if code == OVER else None)
-
-    return close

@@ -96,5 +96,5 @@ el("end").onclick = () => {
   el("end").textContent = "Once more: end it";
   setTimeout(() => { el("end").textContent = "End the class"; }, SURE_MS);
 };
-el("csv").href = `class.csv${location.search}`;
+for (const [id, file] of [["csv", "class.csv"], ["paper", "report.html"], ["handed", "hand-outs.html"]]) el(id).href = file + location.search;
 follow();

@@ -31,6 +31,12 @@ def hold_class(
         Path | None,
         typer.Option("--resume", help="Go on with the class in this folder: all lessons go on where they stopped."),
     ] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option(
+            "--report", help="Write the report and the hand-outs of the class in this folder, and hold no class."
+        ),
+    ] = None,
     pupils: Annotated[int, typer.Option("--pupils", min=1, max=60, help="The number of seats.")] = 30,
     typed_names: Annotated[
         bool, typer.Option("--typed-names", help="Pupils type their names; by default each is given a pseudonym.")
@@ -67,6 +73,13 @@ def hold_class(
     Pupils open the printed address and type the code. Their learners go on where they stopped: after a closed lid, a killed
     server, and with --resume.
     """
+    if report is not None:
+        if lessons or out is not None or resume is not None:
+            raise BadInput(
+                f"--report {report} beside lessons, --out or --resume: it is written of a class that is there, and none is held"
+            )
+        show(deferred.write_report(deferred.Roster.read(report, "--report")), as_json, _report_summary)
+        return
     if resume is not None:
         if lessons or out is not None:
             raise BadInput(
@@ -125,9 +138,16 @@ def _check(roster: "deferred.Roster") -> None:
         deferred.check_lesson(lesson)
 
 
+def _report_summary(document: dict[str, Any]) -> Any:
+    files = document["files"]
+    over = counted(len(document["rows"]), "lesson")
+    return f"{over} taught; report: {files['report']}; hand-outs: {files['hand_outs']}; table: {files['table']}"
+
+
 def _summary(document: dict[str, Any]) -> Any:
     over = len(document["rows"])
     return (
         f"{counted(len(document['pupils']), 'pupil')}, {counted(over, 'lesson')} taught; table: {document['files']['table']}; "
+        f"report: {document['files']['report']}; hand-outs: {document['files']['hand_outs']}; "
         f"go on with: lab class --resume {document['class']}"
     )

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from lab.classroom.class_lesson import ADVISORS as PUPILS
     from lab.classroom.class_lesson import ORDER as ORDER_LESSON
     from lab.classroom.class_lesson import ClassLesson, check_lesson, module_of, order_lesson_named
+    from lab.classroom.class_report import write_report
     from lab.classroom.class_server import ClassServer
     from lab.classroom.code_picture import code_text
     from lab.classroom.holding import attend, begun_words, closing, place_of
@@ -157,6 +158,7 @@ TABLE = {
         "ORDER as ORDER_LESSON",
         "order_lesson_named",
     ),
+    "lab.classroom.class_report": ("write_report",),
     "lab.classroom.class_server": ("ClassServer",),
     "lab.classroom.code_picture": ("code_text",),
     "lab.classroom.holding": ("attend", "begun_words", "closing", "place_of"),
