@@ -18,7 +18,7 @@ from websockets.exceptions import ConnectionClosed, WebSocketException
 from lab.classroom.desk_process import DeskOrder, sit
 
 Json = dict[str, Any]
-State = Literal["opening", "open", "over", "failed", "stopped", "lost"]
+State = Literal["idle", "opening", "open", "over", "failed", "stopped", "lost"]
 KEPT = ("lesson", "place", "robot", "question", "curve", "standing", "notices", "members", "receipt", "ended")
 MOST_MESSAGE = 1 << 24  # bytes of the desk's messages
 PRELOADED = ["lab.classroom.desk_process", "lab.skills.prepared_scene", "lab.learning.kernels"]
@@ -36,7 +36,7 @@ def processes() -> Any:
 class Desk:
     """The process of one lesson, and its state; all methods are called in the server's event loop.
 
-    on_news: called when the shown document or the state has changed.
+    on_news: called when the shown document or the state has changed. state: "idle" for a desk that has no process by intent.
     parts: the newest parts of the page's document. result: the lesson's document, once it is over. text: why it failed.
     """
 
@@ -67,6 +67,16 @@ class Desk:
         self._process.start()
         other.close()
         threading.Thread(target=self._listen, args=[self._pipe], daemon=True).start()
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether the class has closed the desk, whose process then ends within seconds."""
+        return self._closed
+
+    @property
+    def is_there(self) -> bool:
+        """Whether the page of the process answers."""
+        return bool(self._address)
 
     async def close(self) -> None:
         """End the process: the lesson is interrupted, and its journal holds every answer. Safe to call again."""

@@ -8,11 +8,10 @@ from typing import Any
 
 from lab.classroom.class_place import Place
 from lab.classroom.class_server import ClassServer
-from lab.classroom.tile import COLUMNS
+from lab.classroom.tile import COLUMNS, TABLE
 from lab.errors import BadInput
 from lab.files import csv_of, is_file, write_whole
 
-TABLE = "class.csv"
 LOOK_S = 0.5  # interval at which joined pupils and finished lessons are told
 Json = dict[str, Any]
 

@@ -3,7 +3,7 @@
 
 const classTile = (() => {
   const SVG = "http://www.w3.org/2000/svg", WIDE = 240, HIGH = 64, LONG_S = 60;
-  const STATES = { opening: "opens", open: "", over: "done", failed: "failed", stopped: "stopped", lost: "its process has ended" };
+  const STATES = { idle: "", opening: "opens", open: "", over: "done", failed: "failed", stopped: "stopped", lost: "its process has ended" };
   const VERDICTS = { rejected: "dropped: its advice misled", converged: "needs no more advice", left: "works alone" };
 
   function make(name, text, kind) {
@@ -42,6 +42,7 @@ const classTile = (() => {
   }
 
   function status(tile) {
+    if (tile.state === "idle") return [tile.study ? tile.study.doing : "", tile.study && tile.study.doing === "finished" ? "over" : ""];
     if (tile.state !== "open") return [`${STATES[tile.state]}${tile.text ? `: ${tile.text}` : ""}${tile.state === "over" ? (tile.solved ? ": reached its goal" : ": did not reach its goal") : ""}`, tile.state];
     if (!tile.here && tile.asks) return ["asks, and nobody is there", "away"];
     if (tile.asks) return [`asks${tile.asked_s >= LONG_S ? `, waits ${Math.floor(tile.asked_s / 60)} min` : ""}`, tile.asked_s >= LONG_S ? "stuck" : "asks"];
@@ -72,12 +73,15 @@ const classTile = (() => {
       field.focus();
     });
     head.append(name, here);
-    row.append(look, parts.help, ask, button("Next", "to the next lesson", () => act.next(parts.tile)), parts.open);
+    parts.hints = ask;
+    parts.next = button("Next", "to the next lesson", () => act.next(parts.tile));
+    row.append(look, parts.help, ask, parts.next, parts.open);
     box.append(head, parts.picture, says, facts, hint, row, form);
     return parts;
   }
 
-  function draw(parts, tile) {
+  // may: which of the buttons are there
+  function draw(parts, tile, may) {
     const [says, kind] = status(tile), picture = curve(tile);
     parts.tile = tile;
     parts.box.className = `tile ${kind}`;
@@ -88,6 +92,10 @@ const classTile = (() => {
     parts.says.textContent = says;
     const answers = `${tile.taken} answered${tile.skipped ? `, ${tile.skipped} left to it` : ""}${tile.misleads ? `, ${tile.misleads} did not help` : ""}`;
     parts.facts.textContent = `${tile.title || "no lesson yet"}: episode ${tile.episode}${tile.episodes ? ` of ${tile.episodes}` : ""}; ${answers}`;
+    if (tile.study) parts.facts.textContent = `Step ${tile.study.step} of ${tile.study.steps}${tile.study.arm ? `, arm ${tile.study.arm}` : ""} (${tile.study.order.join(", ")})${tile.state === "idle" ? "" : `; ${parts.facts.textContent}`}`;
+    parts.help.hidden = !may.includes("help");
+    parts.hints.hidden = !may.includes("hint");
+    parts.next.hidden = !may.includes("next");
     parts.hint.textContent = tile.hint ? `Hint: ${tile.hint}` : "";
     parts.look.href = `/desk/${location.search}&pupil=${tile.number}`;
     parts.help.textContent = tile.helped ? "Give back" : "Help";
