@@ -44,7 +44,11 @@ ALONE: dict[str, set[str]] = (
         "numba": {"lab.learning.compiled"},  # what is kept of it is kept in one place
         "ortools": {"lab.sequencing.methods.cp_sat_solver"},  # without pandas
         "starlette": {
-            *("lab.view.server", "lab.view.server_page", "lab.classroom.class_server", "lab.classroom.browser_socket"),
+            "lab.view.server",
+            "lab.view.server_page",
+            "lab.classroom.class_server",
+            "lab.classroom.browser_socket",
+            "lab.classroom.step_pages",
         },
         "uvicorn": {"lab.view.server", "lab.view.server_page", "lab.classroom.class_server"},
         "websockets": {"lab.classroom.class_server", "lab.classroom.desk"},

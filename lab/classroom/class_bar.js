@@ -1,10 +1,12 @@
-// What the class says on a pupil's page: lesson, hint, help, pause.
+// What the class says on a pupil's page: lesson, hint, help, pause; in a study the step, the time that is left, and to go on.
 "use strict";
 
 const classBar = (() => {
   const el = (id) => document.getElementById(id);
+  const TICK_MS = 500;
+  let study = null, until = 0;
 
-  function show({ name, lesson, lessons, paused, hint, helped }) {
+  function show({ name, lesson, lessons, paused, hint, helped, study: now }) {
     el("class").hidden = false;
     el("class-name").textContent = name;
     el("class-lesson").textContent = lessons > 1 ? `lesson ${lesson} of ${lessons}` : "";
@@ -12,7 +14,39 @@ const classBar = (() => {
     el("class-hint").textContent = hint ? `Hint: ${hint}` : "";
     el("class-helped").hidden = !helped;
     el("class-paused").hidden = !paused;
+    if (now) showStep(now);
   }
 
+  function showStep(now) {
+    if (!now.here) {
+      location.replace(`/step/${location.search}`);
+      return;
+    }
+    study = now;
+    until = now.left_s === null ? null : performance.now() + 1000 * now.left_s;
+    el("class-lesson").textContent = `step ${now.step} of ${now.steps}`;
+    el("class-step").hidden = false;
+    el("class-go").hidden = !now.over;
+    el("class-withdraw").href = `/step/${location.search}#withdraw`;
+    tick();
+  }
+
+  function tick() {
+    if (study === null) return;
+    const left = until === null ? null : Math.max(0, Math.ceil((until - performance.now()) / 1000));
+    el("class-left").textContent = study.timed_out ? "Your time is up." : study.over ? "The lesson is over." : left === null ? "" : `${Math.floor(left / 60)}:${String(left % 60).padStart(2, "0")} left`;
+  }
+
+  async function goOn() {
+    el("class-go").disabled = true;
+    try {
+      await fetch(`/step/do${location.search}`, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ do: "go on", step: study.step }) });
+    } finally {
+      location.replace(`/step/${location.search}`);
+    }
+  }
+
+  el("class-go").onclick = goOn;
+  setInterval(tick, TICK_MS);
   return { show };
 })();

@@ -10,7 +10,8 @@ from lab.teaching.lesson_options import LessonOptions
 from lab.teaching.subjects import subject_of
 from lab.toolbox.registry import Toolbox
 
-ADVISORS = ("web",)  # of every lesson
+ADVISORS = ("web",)  # of every lesson of a class
+ADVISED = (ADVISORS, ("praise:web",))  # of a lesson of a study
 ORDER = "order:"  # begins the name of a lesson on an order; the rest is what lab sequence takes as TASK
 METHOD = "srl"  # of a lesson on an order: the only method that asks
 ClassLesson = LessonOptions | OrderSessionOptions
@@ -69,8 +70,4 @@ def lesson_from_json(record: dict[str, Any], where: str) -> ClassLesson:
             lesson = OrderSessionOptions.from_json(options, where).complete()
         case other:
             raise BadInput(f"{where}: a lesson is of the kind {other!r:.60}: allowed are 'lesson' and 'order'")
-    if lesson.advisor_names != ADVISORS:
-        raise BadInput(
-            f"{where}: lesson '{name_of(lesson)}' has the advisors {lesson.advisor_names}: pupils advise: {ADVISORS}"
-        )
     return lesson

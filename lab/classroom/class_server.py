@@ -9,8 +9,6 @@ import json
 import secrets
 import ssl
 import threading
-import time
-from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -35,7 +33,11 @@ from lab.classroom.class_report import HAND_OUTS, POLICY, REPORT, page_now
 from lab.classroom.code_picture import code_svg
 from lab.classroom.room import OVER, RELOAD, PupilPage, Room
 from lab.classroom.roster import Full, Roster
+from lab.classroom.step_pages import StepPages
+from lab.classroom.study import Study
+from lab.classroom.study_room import StudyRoom
 from lab.classroom.tile import COLUMNS
+from lab.classroom.wrong_codes import WrongCodes
 from lab.errors import BadInput, WorkFailed
 from lab.files import csv_of
 from lab.view.server import config_of, listening
@@ -47,8 +49,6 @@ READ_S = 0.005  # least interval between two messages from a page
 TILES_EVERY_S = 0.25
 MOST_TEACHERS = 8  # open pages of the teacher
 MOST_LOOKERS = 64  # pages that look over a shoulder
-WRONG, WRONG_S = 20, 60.0  # wrong codes that an address may try in so many seconds
-MOST_ADDRESSES = 1000
 MOST_BODY = 2048  # bytes of a request to join
 FREE = '"free": true'  # in a message about the seat
 FRAMED_NOWHERE = f"{POLICY}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -61,8 +61,8 @@ class ClassServer:
     allowed, before anything is written; entering writes the roster and raises BadInput if it cannot, and WorkFailed.
     """
 
-    def __init__(self, roster: Roster, place: Place, port: int = 0) -> None:
-        self.roster, self._place = roster, place
+    def __init__(self, roster: Roster, place: Place, port: int = 0, study: Study | None = None) -> None:
+        self.roster, self._place, self._study = roster, place, study
         self.fingerprint = ""  # of the certificate
         self._secured: dict[str, str] = {}  # uvicorn's names of its files
         if place.certificate is not None and place.key is not None:
@@ -77,16 +77,18 @@ class ClassServer:
         self._ready = threading.Event()
         self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()), name="class", daemon=True)
         self._teachers: dict[WebSocket, asyncio.Event] = {}
-        self._wrong: dict[str, deque[float]] = {}
+        self._wrong = WrongCodes()
         base = f"{place.hosts[0]}:{self.port}"
         self.join_url = f"{place.scheme}://{base}/?code={roster.code}"
         self.teacher_url = f"{place.scheme}://{base}/teacher/?token={self._token}"
         self._picture = code_svg(self.join_url)
-        self._files = files_of(place.hosts, self.port)
+        self._files = files_of(place.hosts, self.port, study is not None)
 
     def __enter__(self) -> "ClassServer":
         self.roster.port = self.port
         try:
+            if self._study is not None:
+                self._study.begin()
             self.roster.write()
         except OSError as error:
             raise BadInput(f"folder of the class '{self.roster.folder}': {error.strerror or error}") from None
@@ -127,7 +129,7 @@ class ClassServer:
     async def _serve(self) -> None:
         self._loop, self._stopped = asyncio.get_running_loop(), asyncio.Event()
         self._loop.set_exception_handler(quiet_when_full)
-        self.room = Room(self.roster)
+        self.room = Room(self.roster) if self._study is None else StudyRoom(self._study)
         self.room.on_news = self._stir
         server = Uvicorn(config_of(self._application(), **self._secured))
         serving = asyncio.create_task(server.serve(sockets=[self._socket]))
@@ -148,6 +150,7 @@ class ClassServer:
         guards = [Middleware(TrustedHostMiddleware, allowed_hosts=self._place.hosts, www_redirect=False)]
         routes = [
             Route("/join", self._join, methods=["POST"]),
+            *(StepPages(self.room, self._from_here).routes() if isinstance(self.room, StudyRoom) else ()),
             Route("/teacher/class.csv", self._table),
             Route(f"/teacher/{REPORT}", self._report),
             Route(f"/teacher/{HAND_OUTS}", self._report),
@@ -194,8 +197,8 @@ class ClassServer:
         """A new pupil's address, for the right code; an address that tries many codes has to wait."""
         if not self._from_here(request):
             return PlainTextResponse("Another site's page may not join.\n", 403)
-        tried = self._tries(request.client.host if request.client else "")
-        if len(tried) >= WRONG:
+        address = request.client.host if request.client else ""
+        if self._wrong.has_to_wait(address):
             return JSONResponse({"error": "Too many wrong codes: wait a minute."}, 429)
         body = b""
         async for part in request.stream():
@@ -208,26 +211,15 @@ class ClassServer:
         except (ValueError, RecursionError, TypeError, KeyError, AttributeError):
             return JSONResponse({"error": "That is no request to join."}, 400)
         try:
-            joined = self.roster.join(code, name)
+            joined = self.room.join(code, name)
         except Full as reason:
             return JSONResponse({"error": str(reason)}, 409)
         except OSError as error:
             return JSONResponse({"error": f"The class cannot be written: {error.strerror}"}, 500)
         if joined is None:
-            tried.append(time.monotonic())
+            self._wrong.note(address)
             return JSONResponse({"error": "There is no class with this code: look at the board again."}, 403)
-        pupil, key = joined
-        self.room.seat(pupil)
-        return JSONResponse({"name": pupil.name, "page": f"/desk/?token={key}"})
-
-    def _tries(self, address: str) -> deque[float]:
-        """The times of the wrong codes from an address in the last WRONG_S."""
-        if len(self._wrong) > MOST_ADDRESSES:
-            self._wrong.clear()
-        tried = self._wrong.setdefault(address, deque(maxlen=WRONG))
-        while tried and tried[0] < time.monotonic() - WRONG_S:
-            tried.popleft()
-        return tried
+        return JSONResponse(joined)
 
     # ---- a pupil's page, and one that looks over a shoulder
 
@@ -268,7 +260,7 @@ class ClassServer:
         try:
             upstream = await desk.page(watches=not sits)
         except OSError:
-            if desk.state in ("over", "failed", "stopped"):
+            if desk.is_closed or desk.state in ("idle", "over", "failed", "stopped"):
                 await self._show_last(browser, page)
             else:  # it was killed, and is started again
                 await asyncio.sleep(AGAIN_S)
@@ -296,7 +288,7 @@ class ClassServer:
         desk = self.room.desks[page.number]
         shown = desk.parts | {"you": {"seat": False, "free": False, "pages": 1}}
         if desk.state != "over":
-            shown |= {"ended": f"This desk is closed: {desk.text or desk.state}. Ask your teacher to open it again."}
+            shown |= {"ended": self.room.closed_text(page.number)}
         await page.send(json.dumps({"seat": shown}))
         with suppress(WebSocketDisconnect):
             while True:
@@ -350,9 +342,10 @@ class ClassServer:
             tiles, now = self.room.tiles(), {"class": self._known(), "rows": self.room.rows()}
             news = {part: value for part, value in now.items() if told.get(part) != value}
             changed = [tile for number, tile in tiles.items() if seen.get(number) != tile]
+            gone = [number for number in seen if number not in tiles]
             seen, told = tiles, now
-            if changed or news:
-                await send(json.dumps(news | {"tiles": changed}))
+            if changed or news or gone:
+                await send(json.dumps(news | {"tiles": changed, "gone": gone}))
             await asyncio.sleep(TILES_EVERY_S)
             with suppress(TimeoutError):  # the time that questions have waited changes by itself
                 await asyncio.wait_for(stirred.wait(), 1.0)
@@ -365,6 +358,7 @@ class ClassServer:
             "lessons": [title_of(lesson) for lesson in self.roster.lessons],
             "paused": self.room.paused,
             "most": self.roster.most,
+            "study": None if self._study is None else self._study.told(),
         }
 
     async def _do(self, message: str, browser: WebSocket) -> None:

@@ -18,7 +18,7 @@ from websockets.exceptions import ConnectionClosed, WebSocketException
 from lab.classroom.desk_process import DeskOrder, sit
 
 Json = dict[str, Any]
-State = Literal["opening", "open", "over", "failed", "stopped", "lost"]
+State = Literal["idle", "opening", "open", "over", "failed", "stopped", "lost"]
 KEPT = ("lesson", "place", "robot", "question", "curve", "standing", "notices", "members", "work", "receipt", "ended")
 MOST_MESSAGE = 1 << 24  # bytes of the desk's messages
 PRELOADED = ["lab.classroom.desk_process", "lab.skills.prepared_scene", "lab.learning.kernels"]
@@ -36,9 +36,10 @@ def processes() -> Any:
 class Desk:
     """The process of one lesson, and its state; all methods are called in the server's event loop.
 
-    on_news: called when the shown document or the state has changed.
+    on_news: called when the shown document or the state has changed. state: "idle" for a desk that has no process by intent.
     parts: the newest parts of the page's document, of a team that of the one who is first. questions: the pending questions by
-    the names of those who teach together, "" for one pupil alone. result: the lesson's document, once it is over. text: why it failed.
+    the names of those who teach together, "" for one pupil alone. result: the lesson's document, once it is over.
+    text: why it failed.
     """
 
     def __init__(self, order: DeskOrder) -> None:
@@ -69,6 +70,16 @@ class Desk:
         self._process.start()
         other.close()
         threading.Thread(target=self._listen, args=[self._pipe], daemon=True).start()
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether the class has closed the desk, whose process then ends within seconds."""
+        return self._closed
+
+    @property
+    def is_there(self) -> bool:
+        """Whether the page of the process answers."""
+        return bool(self._addresses)
 
     async def close(self) -> None:
         """End the process: the lesson is interrupted, and its journal holds every answer. Safe to call again."""

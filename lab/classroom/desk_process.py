@@ -107,7 +107,9 @@ def _lesson(order: DeskOrder, pages: Mapping[str, SeatPage]) -> Mapping[str, Any
     """The document of `lab teach --json`, or of `lab sequence --json` for a lesson on an order."""
     take_again(order.files)
     with ExitStack() as stack:
-        team = stack.enter_context(Team({PAGE_OF + name: page for name, page in pages.items()})) if order.people else None
+        team = (
+            stack.enter_context(Team({PAGE_OF + name: page for name, page in pages.items()})) if order.people else None
+        )
         seat = LessonSeat(RunProgress(EscapingConsole(quiet=True)), None, pages.get(""), team=team)
         stack.callback(seat.clear_scene)
         toolbox = Toolbox(str(order.toolbox))

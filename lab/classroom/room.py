@@ -6,7 +6,7 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -63,8 +63,17 @@ class Room:
 
     def begin(self) -> None:
         """Open the desks of the roster's pupils."""
-        for pupil in self.roster.pupils:
+        for pupil in self.roster.present:
             self.seat(pupil)
+
+    def join(self, code: str, name: str) -> Json | None:
+        """What is said to a new pupil, `page` is the address; None for a wrong code. Raises Full, and OSError."""
+        joined = self.roster.join(code, name)
+        if joined is None:
+            return None
+        pupil, key = joined
+        self.seat(pupil)
+        return {"name": pupil.name, "page": f"/desk/?token={key}"}
 
     async def end(self) -> None:
         """Close all desks: lessons that are not over can be resumed."""
@@ -80,9 +89,8 @@ class Room:
 
     def seat(self, pupil: Pupil) -> None:
         """Open the desk of a pupil at the pupil's lesson: the lesson begins, goes on, or is shown if it is over."""
-        options = replace(self.roster.lessons[pupil.lesson], seed=self.roster.seed)
-        folder, toolbox = self.folder(pupil, pupil.lesson), self.roster.folder / pupil.folder / "toolbox"
-        order = DeskOrder(options, folder, toolbox, modules=self.roster.modules)
+        folder, toolbox = self.folder(pupil, pupil.lesson), self.toolbox(pupil)
+        order = DeskOrder(self.roster.lessons[pupil.lesson], folder, toolbox, modules=self.roster.modules)
         before = self.desks.get(pupil.number)
         desk = self.desks[pupil.number] = Desk(order)
         desk.on_news = lambda: self._stirred(pupil.number, desk)
@@ -90,11 +98,22 @@ class Room:
         if kept is not None:
             desk.state, desk.result, desk.parts = "over", kept["document"], kept["page"]
             desk.ready.set()
+        elif not self.opens(pupil):
+            desk.state = "idle"
+            desk.ready.set()
         else:
             self._start(self._opened(desk, before))
         if before is not None:
             self._start(before.close())
         self.on_news()
+
+    def toolbox(self, pupil: Pupil) -> Path:
+        """The folder of the toolbox of a pupil's lesson."""
+        return self.roster.folder / pupil.folder / "toolbox"
+
+    def opens(self, pupil: Pupil) -> bool:
+        """Whether a desk that is not over gets a process: always in a class."""
+        return True
 
     async def _opened(self, desk: Desk, before: Desk | None) -> None:
         """Open a desk after the one before it, whose journal it may go on with, has been closed."""
@@ -111,7 +130,7 @@ class Room:
 
     def _stirred(self, number: int, desk: Desk) -> None:
         """Something of a desk has changed: keep a finished lesson, note when a question came."""
-        if self.desks[number] is not desk:
+        if self.desks.get(number) is not desk:
             return  # it was closed, and another one is in its place
         question = desk.parts.get("question")
         if not question:
@@ -122,7 +141,7 @@ class Room:
             kept = {"document": desk.result, "page": desk.parts}
             with suppress(OSError):  # a full disk: the journal has been written, and the lesson is over anyway
                 write_whole(desk.order.folder / KEPT, json.dumps(kept).encode())
-        if desk.state == "lost" and not self.ended.is_set():
+        if desk.state == "lost" and not (self.ended.is_set() or desk.is_closed):
             lesson = (number, self.roster.pupils[number - 1].lesson)
             self._lost[lesson] += 1
             if self._lost[lesson] <= MOST_LOST:
@@ -165,7 +184,16 @@ class Room:
             "hint": self._hints.get(number, ""),
             "helped": number in self._helped,
         }
-        self._start(page.send(json.dumps({"class": told})))
+        self._start(page.send(json.dumps({"class": told | self.told_more(number)})))
+
+    def told_more(self, number: int) -> Json:
+        """What else a pupil's page is told: nothing in a class."""
+        return {}
+
+    def closed_text(self, number: int) -> str:
+        """What a pupil's page says of a lesson that is not over and has no process."""
+        desk = self.desks[number]
+        return f"This desk is closed: {desk.text or desk.state}. Ask your teacher to open it again."
 
     # ---- what the teacher does
 
@@ -201,7 +229,7 @@ class Room:
 
         Who is at that lesson already stays there. Raises BadInput for a pupil or lesson that there is not.
         """
-        pupils = [*self.roster.pupils] if number is None else [self._pupil(number)]
+        pupils = self.roster.present if number is None else [self._pupil(number)]
         for pupil in pupils:
             wanted = pupil.lesson + 1 if lesson is None else lesson
             if number is None and wanted >= len(self.roster.lessons):
@@ -220,15 +248,15 @@ class Room:
     def open_again(self, number: int) -> None:
         """Open a desk again whose process has ended or failed. Raises BadInput if it has not."""
         pupil = self._pupil(number)
-        if self.desks[number].state in ("opening", "open", "over"):
+        if self.desks[number].state in ("idle", "opening", "open", "over"):
             raise BadInput(f"desk {number} is {self.desks[number].state}: nothing is to be mended")
         self.seat(pupil)
         if page := self.pages.get(number):
             self._start(page.close(RELOAD))
 
     def _pupil(self, number: int) -> Pupil:
-        if not 1 <= number <= len(self.roster.pupils):
-            raise BadInput(f"pupil {number}: the class has {len(self.roster.pupils)}")
+        if not 1 <= number <= len(self.roster.pupils) or self.roster.pupils[number - 1].is_gone:
+            raise BadInput(f"pupil {number}: the class has {len(self.roster.present)}")
         return self.roster.pupils[number - 1]
 
     def _show_all(self, number: int | None = None) -> None:
@@ -249,14 +277,14 @@ class Room:
                 now_s - self._asked[pupil.number][1] if pupil.number in self._asked else None,
             )
             | {"hint": self._hints.get(pupil.number, ""), "helped": pupil.number in self._helped}
-            for pupil in self.roster.pupils
+            for pupil in self.roster.present
         }
 
     def rows(self) -> list[Json]:
         """The rows of all finished lessons: lesson by lesson, best teacher first."""
         rows: list[Json] = []
         for lesson in range(len(self.roster.lessons)):
-            finished = [(pupil, self._document(pupil, lesson)) for pupil in self.roster.pupils]
+            finished = [(pupil, self._document(pupil, lesson)) for pupil in self.roster.present]
             rows += best_first([row_of(pupil, lesson, document) for pupil, document in finished if document])
         return rows
 

@@ -16,7 +16,7 @@ import numpy as np
 from annotated_types import Ge, Le, MinLen
 from pydantic import StringConstraints, TypeAdapter, ValidationError
 
-from lab.classroom.class_lesson import ClassLesson, lesson_from_json, lesson_to_json
+from lab.classroom.class_lesson import ADVISED, ADVISORS, ClassLesson, lesson_from_json, lesson_to_json, name_of
 from lab.errors import BadInput
 from lab.files import is_file, read_limited, write_whole
 
@@ -24,6 +24,7 @@ FILE = "class.json"
 FORMAT: Final = "teaching-lab class 1"
 MOST_BYTES = 1 << 22
 MOST_PUPILS = 60
+MOST_PARTICIPANTS = 500  # of a study, who are not all there at once
 NAME_LENGTH = 24
 LETTERS = "23456789abcdefghjkmnpqrstuvwxyz"  # without those that look alike
 CODE_LENGTH = 6
@@ -40,7 +41,10 @@ ANIMALS = (
 
 @dataclass(frozen=True)
 class Pupil:
-    """A pupil: a number from 1 on, a name, the SHA-256 of the key in the pupil's address, and the current lesson's number."""
+    """A pupil: a number from 1 on, a name, the SHA-256 of the key in the pupil's address, and the current lesson's number.
+
+    A participant who has withdrawn leaves the number alone: name and hash are "", and nobody gets the number again.
+    """
 
     number: int
     name: str
@@ -48,9 +52,29 @@ class Pupil:
     lesson: int = 0
 
     @property
+    def is_gone(self) -> bool:
+        """Whether this is only the number of somebody who has withdrawn."""
+        return not self.name
+
+    @property
     def folder(self) -> str:
         """The name of the pupil's folder in that of the class."""
         return f"{self.number:02}-{self.name.replace(' ', '-')}"
+
+
+@dataclass
+class StudyEntry:
+    """What a class's file keeps of a study: the SHA-256 of its protocol, and the position of each number in the design.
+
+    A position is None for who has withdrawn: the next participant gets it.
+    """
+
+    protocol_sha256: str
+    positions: list[int | None] = field(default_factory=list)
+
+    def free_position(self) -> int:
+        """The lowest position (from 0) that no participant has."""
+        return next(position for position in range(len(self.positions) + 1) if position not in self.positions)
 
 
 @dataclass
@@ -61,10 +85,11 @@ class _Kept:
     code: Annotated[str, StringConstraints(pattern=f"^[{LETTERS}]{{{CODE_LENGTH}}}$")]
     lessons: Annotated[list[dict[str, Any]], MinLen(1)]
     seed: Annotated[int, Ge(0)]
-    most: Annotated[int, Ge(1), Le(MOST_PUPILS)]
+    most: Annotated[int, Ge(1), Le(MOST_PARTICIPANTS)]
     typed_names: bool
     port: Annotated[int, Ge(0), Le(65535)]
     pupils: list[Pupil]
+    study: StudyEntry | None = None
 
 
 class Full(Exception):
@@ -76,7 +101,8 @@ class Roster:
     """The lessons and pupils of a class; every change is written to `folder` at once.
 
     code: what pupils type to join; port: of the last server, so that pupils' pages find the next one; typed_names: whether
-    pupils choose their names; modules: those that the teacher has named for lessons such as gym:MODULE:ID, which is not kept.
+    pupils choose their names; modules: those that the teacher has named for lessons such as gym:MODULE:ID, which is not kept;
+    study: of a class that is a study.
     """
 
     folder: Path
@@ -88,6 +114,7 @@ class Roster:
     port: int = 0
     pupils: list[Pupil] = field(default_factory=list)
     modules: tuple[str, ...] = ()
+    study: StudyEntry | None = None
 
     @classmethod
     def new(cls, folder: Path, lessons: Sequence[ClassLesson], seed: int, most: int, typed_names: bool) -> "Roster":
@@ -117,17 +144,32 @@ class Roster:
             at = ".".join(map(str, why["loc"]))
             raise BadInput(f"{where}: {at}: {why['msg']}: a file of lab class is wanted") from None
         lessons = tuple(lesson_from_json(options, where) for options in kept.lessons)
+        for lesson in lessons:
+            allowed = (ADVISORS,) if kept.study is None else ADVISED
+            if lesson.advisor_names not in allowed:
+                raise BadInput(
+                    f"{where}: lesson '{name_of(lesson)}' has the advisors {lesson.advisor_names}: pupils advise: {ADVISORS}"
+                )
+        if kept.study is not None and len(kept.study.positions) != len(kept.pupils):
+            raise BadInput(
+                f"{where}: {len(kept.study.positions)} positions, {len(kept.pupils)} pupils: a file of lab class is wanted"
+            )
         for number, pupil in enumerate(kept.pupils, start=1):
             if pupil.number != number or clean_name(pupil.name) != pupil.name or not 0 <= pupil.lesson < len(lessons):
                 raise BadInput(f"{where}: pupil {number} is {asdict(pupil)}: a file of lab class is wanted")
-        return cls(folder, kept.code, lessons, kept.seed, kept.most, kept.typed_names, kept.port, kept.pupils)
+        read = cls(folder, kept.code, lessons, kept.seed, kept.most, kept.typed_names, kept.port, kept.pupils)
+        read.study = kept.study
+        return read
 
     def write(self) -> None:
         """Write the roster, whose folder is made if it is missing. Raises OSError."""
         self.folder.mkdir(parents=True, exist_ok=True)
         lessons = [lesson_to_json(lesson) for lesson in self.lessons]
-        kept = _Kept(FORMAT, self.code, lessons, self.seed, self.most, self.typed_names, self.port, self.pupils)
-        write_whole(self.folder / FILE, (json.dumps(asdict(kept), indent=1) + "\n").encode())
+        kept = _Kept(
+            FORMAT, self.code, lessons, self.seed, self.most, self.typed_names, self.port, self.pupils, self.study
+        )
+        record = {name: value for name, value in asdict(kept).items() if name != "study" or value is not None}
+        write_whole(self.folder / FILE, (json.dumps(record, indent=1) + "\n").encode())
 
     # ---- pupils
 
@@ -140,16 +182,55 @@ class Roster:
 
         name: what the pupil typed, which counts only in a class of typed names; a name that is taken gets a number.
         """
-        if not compare_digest(code.strip().lower().encode(), self.code.encode()):
+        if not self.is_code(code):
             return None
-        if len(self.pupils) >= self.most:
-            raise Full(f"This class is full: it has {self.most} seats.")
+        self.check_room()
         wanted = clean_name(name) if self.typed_names else ""
         key = token_urlsafe(16)
         pupil = Pupil(len(self.pupils) + 1, self._free(wanted or self._pseudonym()), hash_of(key))
         self.pupils.append(pupil)
         self.write()
         return pupil, key
+
+    def is_code(self, code: str) -> bool:
+        """Whether somebody has typed the class's code."""
+        return compare_digest(code.strip().lower().encode("utf-8", "surrogatepass"), self.code.encode())
+
+    def check_room(self) -> None:
+        """Raises Full unless another pupil may join."""
+        if len(self.present) >= self.most:
+            raise Full(f"This class is full: it has {self.most} seats.")
+
+    @property
+    def present(self) -> list[Pupil]:
+        """The pupils, without the numbers of those who have withdrawn."""
+        return [pupil for pupil in self.pupils if not pupil.is_gone]
+
+    def admit(self, key: str, name: str = "") -> tuple[Pupil, int]:
+        """A new participant of a study, who has agreed, and the position in its design. name: "" for a pseudonym.
+
+        Raises Full, and OSError if the roster cannot be written: then nobody was admitted.
+        """
+        assert self.study is not None
+        self.check_room()
+        pupil = Pupil(len(self.pupils) + 1, self._free(name or self._pseudonym()), hash_of(key))
+        position = self.study.free_position()
+        self.pupils.append(pupil)
+        self.study.positions.append(position)
+        try:
+            self.write()
+        except OSError:
+            self.pupils.pop()
+            self.study.positions.pop()
+            raise
+        return pupil, position
+
+    def retire(self, number: int) -> None:
+        """Keep of a participant the number alone; the position in the design is free again. Raises OSError."""
+        assert self.study is not None
+        self.pupils[number - 1] = Pupil(number, "", "")
+        self.study.positions[number - 1] = None
+        self.write()
 
     def of_key(self, key: str) -> Pupil | None:
         """The pupil with this key; None for any other text."""
@@ -175,7 +256,7 @@ class Roster:
 
     def _free(self, name: str) -> str:
         taken = {pupil.name for pupil in self.pupils}
-        others = (f"{name[: NAME_LENGTH - 4]} {number}" for number in range(2, MOST_PUPILS + 2))
+        others = (f"{name[: NAME_LENGTH - 4]} {number}" for number in range(2, len(taken) + 3))
         return name if name not in taken else next(other for other in others if other not in taken)
 
 

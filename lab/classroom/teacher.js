@@ -3,6 +3,8 @@
 
 const el = (id) => document.getElementById(id), { make } = classTile;
 const boxes = new Map(), SURE_MS = 3000;
+let END = "End the class";
+let study = null; // its title, and what this page may do in it
 let socket = null, paused = false, wall = false, sure = 0;
 
 const say = (message) => socket && socket.readyState === WebSocket.OPEN && socket.send(JSON.stringify(message));
@@ -20,6 +22,13 @@ function showClass(now) {
   paused = now.paused;
   el("pause").textContent = paused ? "Go on" : "Pause all";
   el("pause").setAttribute("aria-pressed", String(paused));
+  study = now.study;
+  if (study) {
+    el("title").textContent = document.title = study.title;
+    el("pause").hidden = !study.may.includes("pause");
+    el("to-lesson").hidden = el("all").hidden = true;
+    el("end").textContent = END = "End for now";
+  }
   el("picture").src = now.picture;
   el("address").textContent = now.join.replace(/\?.*/, "");
   el("code").textContent = now.code;
@@ -32,16 +41,20 @@ function showClass(now) {
   if (chosen) el("lesson").value = chosen;
 }
 
-function showTiles(tiles) {
+function showTiles(tiles, gone) {
+  for (const number of gone) {
+    boxes.get(number)?.box.remove();
+    boxes.delete(number);
+  }
   for (const tile of tiles) {
     if (!boxes.has(tile.number)) {
       boxes.set(tile.number, classTile.create(act));
       el("tiles").append(boxes.get(tile.number).box);
     }
-    classTile.draw(boxes.get(tile.number), tile);
+    classTile.draw(boxes.get(tile.number), tile, study ? study.may : ["help", "hint", "next"]);
   }
   const here = document.querySelectorAll("#tiles small.here").length;
-  el("how").textContent = boxes.size ? `${here} of ${boxes.size} pupils are here` : "Nobody has joined yet.";
+  el("how").textContent = boxes.size ? `${here} of ${boxes.size} ${study ? "participants" : "pupils"} are here` : "Nobody has joined yet.";
 }
 
 const HEADS = [
@@ -71,11 +84,11 @@ function follow(pause = 300) {
   socket = new WebSocket(new URL(`frames${location.search}`, location.href.replace(/^http/, "ws")));
   socket.onopen = () => { pause = 300; };
   socket.onmessage = (event) => {
-    const { class: now, rows, tiles, refusal } = JSON.parse(event.data);
+    const { class: now, rows, tiles, gone, refusal } = JSON.parse(event.data);
     el("told").textContent = refusal || "";
     if (now) showClass(now);
     if (rows) showRows(rows);
-    if (tiles) showTiles(tiles);
+    if (tiles) showTiles(tiles, gone);
   };
   socket.onclose = () => {
     el("how").textContent = "connection lost: trying again";
@@ -94,7 +107,7 @@ el("end").onclick = () => {
   if (performance.now() < sure) say({ do: "end" });
   sure = performance.now() + SURE_MS;
   el("end").textContent = "Once more: end it";
-  setTimeout(() => { el("end").textContent = "End the class"; }, SURE_MS);
+  setTimeout(() => { el("end").textContent = END; }, SURE_MS);
 };
 for (const [id, file] of [["csv", "class.csv"], ["paper", "report.html"], ["handed", "hand-outs.html"]]) el(id).href = file + location.search;
 follow();

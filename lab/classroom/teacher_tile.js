@@ -3,7 +3,7 @@
 
 const classTile = (() => {
   const SVG = "http://www.w3.org/2000/svg", WIDE = 240, HIGH = 64, LONG_S = 60;
-  const STATES = { opening: "opens", open: "", over: "done", failed: "failed", stopped: "stopped", lost: "its process has ended" };
+  const STATES = { idle: "", opening: "opens", open: "", over: "done", failed: "failed", stopped: "stopped", lost: "its process has ended" };
   const ENDS = { steps: ["did not reach its goal", "reached its goal"], order: ["its order is not proven the best", "found a best order"] };
   const VERDICTS = { rejected: "dropped: its advice misled", converged: "needs no more advice", left: "works alone" };
 
@@ -45,6 +45,7 @@ const classTile = (() => {
   const best = ({ kind, best: least, optimal }) => (kind !== "order" || least === null ? "" : `; best order ${Math.round(least)}${optimal ? `, bound ${Math.round(optimal)}` : ""}`);
 
   function status(tile) {
+    if (tile.state === "idle") return [tile.study ? tile.study.doing : "", tile.study && tile.study.doing === "finished" ? "over" : ""];
     if (tile.state !== "open") return [`${STATES[tile.state]}${tile.text ? `: ${tile.text}` : ""}${tile.state === "over" ? `: ${ENDS[tile.kind][Number(tile.solved)]}` : ""}`, tile.state];
     if (!tile.here && tile.asks) return ["asks, and nobody is there", "away"];
     if (tile.asks) return [`asks${tile.asked_s >= LONG_S ? `, waits ${Math.floor(tile.asked_s / 60)} min` : ""}`, tile.asked_s >= LONG_S ? "stuck" : "asks"];
@@ -75,12 +76,15 @@ const classTile = (() => {
       field.focus();
     });
     head.append(name, here);
-    row.append(look, parts.help, ask, button("Next", "to the next lesson", () => act.next(parts.tile)), parts.open);
+    parts.hints = ask;
+    parts.next = button("Next", "to the next lesson", () => act.next(parts.tile));
+    row.append(look, parts.help, ask, parts.next, parts.open);
     box.append(head, parts.picture, says, facts, hint, row, form);
     return parts;
   }
 
-  function draw(parts, tile) {
+  // may: which of the buttons are there
+  function draw(parts, tile, may) {
     const [says, kind] = status(tile), picture = curve(tile);
     parts.tile = tile;
     parts.box.className = `tile ${kind}`;
@@ -91,6 +95,10 @@ const classTile = (() => {
     parts.says.textContent = says;
     const answers = `${tile.taken} answered${tile.skipped ? `, ${tile.skipped} left to it` : ""}${tile.misleads ? `, ${tile.misleads} did not help` : ""}`;
     parts.facts.textContent = `${tile.title || "no lesson yet"}: episode ${tile.episode}${tile.episodes ? ` of ${tile.episodes}` : ""}; ${answers}${best(tile)}`;
+    if (tile.study) parts.facts.textContent = `Step ${tile.study.step} of ${tile.study.steps}${tile.study.arm ? `, arm ${tile.study.arm}` : ""} (${tile.study.order.join(", ")})${tile.state === "idle" ? "" : `; ${parts.facts.textContent}`}`;
+    parts.help.hidden = !may.includes("help");
+    parts.hints.hidden = !may.includes("hint");
+    parts.next.hidden = !may.includes("next");
     parts.hint.textContent = tile.hint ? `Hint: ${tile.hint}` : "";
     parts.look.href = `/desk/${location.search}&pupil=${tile.number}`;
     parts.help.textContent = tile.helped ? "Give back" : "Help";

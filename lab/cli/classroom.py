@@ -12,6 +12,8 @@ from lab.cli.output import console, show
 from lab.errors import BadInput, counted
 from lab.lazy import rich
 
+PUPILS = 30  # seats of a class
+
 
 def hold_class(
     lessons: Annotated[
@@ -37,7 +39,15 @@ def hold_class(
             "--report", help="Write the report and the hand-outs of the class in this folder, and hold no class."
         ),
     ] = None,
-    pupils: Annotated[int, typer.Option("--pupils", min=1, max=60, help="The number of seats.")] = 30,
+    study: Annotated[
+        Path | None,
+        typer.Option(
+            "--study",
+            metavar="FILE",
+            help="A study with people by this protocol (TOML), instead of a class with lessons.",
+        ),
+    ] = None,
+    pupils: Annotated[int, typer.Option("--pupils", min=1, max=60, help="The number of seats.")] = PUPILS,
     typed_names: Annotated[
         bool, typer.Option("--typed-names", help="Pupils type their names; by default each is given a pseudonym.")
     ] = False,
@@ -70,6 +80,7 @@ def hold_class(
 ) -> None:
     """A class in browsers: each pupil teaches a learner of their own, and the teacher looks on and helps.
 
+    With --study it is a study with people: participants agree, go through the protocol's arms, and may withdraw.
     Pupils open the printed address and type the code. Their learners go on where they stopped: after a closed lid, a killed
     server, and with --resume.
     """
@@ -80,20 +91,35 @@ def hold_class(
             )
         show(deferred.write_report(deferred.Roster.read(report, "--report")), as_json, _report_summary)
         return
+    held = None
     if resume is not None:
-        if lessons or out is not None:
+        if lessons or out is not None or study is not None:
             raise BadInput(
-                f"--resume {resume} beside lessons or --out: a class goes on with its own lessons in its own folder"
+                f"--resume {resume} beside lessons, --study or --out: a class goes on with its own lessons in its own folder"
             )
         roster = deferred.Roster.read(resume)
         roster.modules = tuple(trust_module or ())
+        held = None if roster.study is None else deferred.StudyWithPeople.read(roster)
+    elif study is not None:
+        given = {
+            "LESSON": lessons,
+            "--typed-names": typed_names,
+            "--task": task,
+            "--learner": learner,
+            "--gate": gate,
+            "--episodes": episodes,
+            "--seed": seed,
+            "--pupils": pupils != PUPILS,
+        }
+        held = _study(study, out, tuple(trust_module or ()), [name for name, value in given.items() if value])
+        roster = held.roster
     else:
         roster = _new(lessons or [], out, pupils, typed_names, seed, (task, learner, gate, episodes))
         roster.modules = tuple(filter(None, map(deferred.module_of, roster.lessons)))
     _check(roster)
     place = deferred.place_of(lan, name or (), certificate, key)
     said = console()
-    with deferred.ClassServer(roster, place, port or roster.port) as server:
+    with deferred.ClassServer(roster, place, port or roster.port, held) as server:
         for line in deferred.begun_words(server):
             said.print(line, soft_wrap=True, highlight=False)
         if said.is_terminal:
@@ -127,15 +153,34 @@ def _new(
     return deferred.Roster.new(out, wanted, seed, pupils, typed_names)
 
 
+def _study(file: Path, out: Path | None, modules: tuple[str, ...], beside: list[str]) -> "deferred.StudyWithPeople":
+    """A new study. Raises BadInput, also for options that its protocol has, and for typed names, which it never has."""
+    if "--typed-names" in beside:
+        raise BadInput(f"--typed-names beside --study {file}: participants have ids or pseudonyms, and never names")
+    if beside:
+        raise BadInput(
+            f"{beside[0]} beside --study {file}: lessons, options, seed and seats of a study are in its protocol"
+        )
+    if out is None:
+        raise BadInput("--out is missing: the folder in which the study is kept, such as --out who-asks")
+    held = deferred.StudyWithPeople.new(file, out, lambda lesson: _check_lesson(lesson, str(file), modules))
+    held.roster.modules = modules
+    return held
+
+
 def _check(roster: "deferred.Roster") -> None:
     """Check every lesson before anybody joins. Raises BadInput, also for code that is named in the class's file alone."""
     for lesson in roster.lessons:
-        if (module := deferred.module_of(lesson)) and module not in roster.modules:
-            raise BadInput(
-                f"class '{roster.folder}' names the module '{module}', whose code would run: if you trust whoever made it, "
-                f"say --trust-module {module}"
-            )
-        deferred.check_lesson(lesson)
+        _check_lesson(lesson, f"class '{roster.folder}'", roster.modules)
+
+
+def _check_lesson(lesson: "deferred.ClassLesson", where: str, modules: tuple[str, ...]) -> None:
+    if (module := deferred.module_of(lesson)) and module not in modules:
+        raise BadInput(
+            f"{where} names the module '{module}', whose code would run: if you trust whoever made it, "
+            f"say --trust-module {module}"
+        )
+    deferred.check_lesson(lesson)
 
 
 def _report_summary(document: dict[str, Any]) -> Any:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from lab.classroom.code_picture import code_text
     from lab.classroom.holding import attend, begun_words, closing, place_of
     from lab.classroom.roster import Roster
+    from lab.classroom.study import Study as StudyWithPeople
     from lab.export import FORMATS
     from lab.export.commands import Path as Lines
     from lab.export.play import deviation
@@ -163,6 +164,7 @@ TABLE = {
     "lab.classroom.code_picture": ("code_text",),
     "lab.classroom.holding": ("attend", "begun_words", "closing", "place_of"),
     "lab.classroom.roster": ("Roster",),
+    "lab.classroom.study": ("Study as StudyWithPeople",),
     "lab.export": ("FORMATS",),
     "lab.export.commands": ("Path as Lines",),
     "lab.export.program": ("Options", "POSITIONS", "Program"),

@@ -1,7 +1,7 @@
 """Several people who advise one learner, each on a page of their own: a question goes to all of them at once."""
 
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -114,5 +114,3 @@ def _answer(page: "SeatPage", request: Request) -> Reply:
         return page.ask(request)
     except KeyboardInterrupt:
         raise AdvisorLeft("quit") from None
-
-

@@ -12,8 +12,9 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosedError, InvalidStatus
 
 from lab.classroom.class_place import Place
-from lab.classroom.class_server import WRONG, ClassServer
+from lab.classroom.class_server import ClassServer
 from lab.classroom.roster import Roster
+from lab.classroom.wrong_codes import WRONG
 from lab.seat.lesson_seat import LessonSeat
 from lab.seat.run_progress import RunProgress
 from lab.teaching.lesson import teach
