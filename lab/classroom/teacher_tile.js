@@ -42,7 +42,7 @@ const classTile = (() => {
     return svg;
   }
 
-  const best = ({ kind, best: least, optimal }) => (kind !== "order" || least === null ? "" : `; best order ${Math.round(least)}${optimal ? `, bound ${Math.round(optimal)}` : ""}`);
+  const best = ({ kind, best: least, optimal, proven }) => (kind !== "order" || least === null ? "" : `; best order ${Math.round(least)}${optimal ? `, ${proven ? "optimum" : "bound"} ${Math.round(optimal)}` : ""}`);
 
   function status(tile) {
     if (tile.state !== "open") return [`${STATES[tile.state]}${tile.text ? `: ${tile.text}` : ""}${tile.state === "over" ? `: ${ENDS[tile.kind][Number(tile.solved)]}` : ""}`, tile.state];
