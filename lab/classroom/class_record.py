@@ -13,6 +13,7 @@ from pydantic import TypeAdapter, ValidationError
 from lab.advice.entries import FILE, Entry, read_journal
 from lab.advice.receipt import receipt
 from lab.classroom.class_lesson import title_of
+from lab.classroom.curve_chart import Curve, Middle, middle_of
 from lab.classroom.kept_lesson import kept_lesson
 from lab.classroom.roster import Pupil, Roster
 from lab.classroom.tile import best_first, is_order, row_of
@@ -144,12 +145,18 @@ class LessonRecord:
         return next((value for value in known if value is not None), None)
 
     @property
-    def unit(self) -> str:
-        """What a curve shows, for its axis."""
-        if not self.about_order:
-            return "steps"
-        is_time = any(row.objective == MAKESPAN for row in self.finished)
-        return f"best order so far{' [s]' if is_time else ''}"
+    def is_timed(self) -> bool:
+        """Whether the cost of an order is its makespan [s]; False while nobody has finished the lesson."""
+        return any(row.objective == MAKESPAN for row in self.finished)
+
+    @cached_property
+    def middle(self) -> Middle | None:
+        """The median of all pupils' curves."""
+        return middle_of([self.curve(one) for one in self.taught])
+
+    def curve(self, one: TaughtLesson) -> Curve:
+        """What is drawn of a pupil's lesson: the steps of the episodes, or the cost of the best order so far."""
+        return one.best_so_far if self.about_order else one.curve
 
     @property
     def best_teacher(self) -> TaughtLesson | None:

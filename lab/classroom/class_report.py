@@ -3,6 +3,7 @@
 from base64 import b64encode
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -44,11 +45,14 @@ class HandOutLesson:
     map: str
 
 
+HandOut = tuple[Pupil, list[HandOutLesson]]
+
+
 def how_it_ended(one: TaughtLesson, about_order: bool) -> str:
     """What became of the lesson, in words."""
     row = one.row
     if row is None:
-        return f"not over after {counted(len(one.curve), 'episode')}"
+        return f"still learning after {counted(len(one.curve), 'episode')}"
     if about_order:
         return "found a best order" if row.solved else "its order is not proven the best"
     return "reached its goal" if row.solved else "did not reach its goal"
@@ -117,28 +121,25 @@ def number(value: Number) -> str:
     return "" if value is None else f"{value:.10g}" if isinstance(value, int) or value.is_integer() else f"{value:.1f}"
 
 
+def cost(record: LessonRecord, value: Number) -> str:
+    """The steps of a path, or the cost of an order with its unit, "" if it is unknown."""
+    return number(value) + " s" * (record.is_timed and value is not None)
+
+
 def class_chart(record: LessonRecord) -> Chart | None:
     """The curves of all pupils in one picture, the best teacher's last, and their median."""
     best = record.best_teacher
-    others = [one for one in record.taught if one is not best]
-    curves: list[tuple[Kind, str, Curve]] = [(_kind(one), one.pupil.name, _curve(record, one)) for one in others]
-    if best is not None:
-        curves.append(("best", best.pupil.name, _curve(record, best)))
-    return chart_of(curves, record.optimum, [curve for _, _, curve in curves], from_zero=not record.about_order)
+    drawn = [one for one in record.taught if one is not best] + ([] if best is None else [best])
+    curves: list[tuple[Kind, str, Curve]] = [
+        ("best" if one is best else _kind(one), one.pupil.name, record.curve(one)) for one in drawn
+    ]
+    return chart_of(curves, record.optimum, record.middle, from_zero=not record.about_order)
 
 
 def own_chart(record: LessonRecord, one: TaughtLesson) -> Chart | None:
     """The curve of one pupil, and the median of the class."""
-    others = [_curve(record, other) for other in record.taught]
-    own: Kind = "own"
-    return chart_of(
-        [(own, one.pupil.name, _curve(record, one))], record.optimum, others, from_zero=not record.about_order
-    )
-
-
-def _curve(record: LessonRecord, one: TaughtLesson) -> Curve:
-    """The steps of the episodes; in a lesson on an order the cost of the best order so far."""
-    return one.best_so_far if record.about_order else one.curve
+    curves: list[tuple[Kind, str, Curve]] = [("own", one.pupil.name, record.curve(one))]
+    return chart_of(curves, record.optimum, record.middle, from_zero=not record.about_order)
 
 
 def _kind(one: TaughtLesson) -> Kind:
@@ -158,40 +159,41 @@ def report_page(title: str, records: Sequence[LessonRecord], pupils: int) -> str
     )
 
 
-def hand_out_page(title: str, records: Sequence[LessonRecord], pupils: Sequence[Pupil]) -> str:
-    """A page for each of these pupils: the curve, the receipt in words, and the map with the learned path."""
+def hand_outs(records: Sequence[LessonRecord], pupils: Sequence[Pupil]) -> list[HandOut]:
+    """What is handed out to each of these pupils."""
     handed = []
     for pupil in pupils:
         own = [(record, one) for record in records for one in record.taught if one.pupil.number == pupil.number]
         lessons = [HandOutLesson(record, one, own_chart(record, one), _data_url(one.value_map)) for record, one in own]
         handed.append((pupil, lessons))
+    return handed
+
+
+def hand_out_page(title: str, handed: Sequence[HandOut]) -> str:
+    """A page for each pupil: the curve, the receipt in words, and the map with the learned path, or the learned order."""
     return _rendered("hand_out.html", title=title, handed=handed)
 
 
-def _rendered(template: str, **known: Any) -> str:
-    page = jinja2.Environment(
+@cache
+def _templates() -> "jinja2.Environment":
+    return jinja2.Environment(
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
         loader=jinja2.FileSystemLoader(HERE),
     )
-    words = {
-        function.__name__: function
-        for function in (
-            how_it_ended,
-            what_was_believed,
-            better_episodes,
-            before_and_after,
-            best_answers,
-            receipt_lines,
-            number,
-            counted,
-        )
-    }
-    return page.get_template(template).render(
-        **known, **words, version=__version__, policy=POLICY, legend=LEGEND, css=(HERE / "class_report.css").read_text()
+
+
+def _rendered(template: str, **known: Any) -> str:
+    words = (
+        *(how_it_ended, what_was_believed, better_episodes, before_and_after),
+        *(best_answers, receipt_lines, number, cost, counted),
     )
+    functions = {function.__name__: function for function in words}
+    css = (HERE / "class_report.css").read_text(encoding="utf-8")
+    page = _templates().get_template(template)
+    return page.render(**known, **functions, version=__version__, policy=POLICY, legend=LEGEND, css=css)
 
 
 def _data_url(picture: bytes | None) -> str:
@@ -208,7 +210,9 @@ def title_of_class(roster: Roster) -> str:
 def page_now(roster: Roster, name: str) -> str:
     """The report or the hand-outs of a class at this moment; name: REPORT or HAND_OUTS."""
     records, pupils, title = class_record(roster), [*roster.pupils], title_of_class(roster)
-    return report_page(title, records, len(pupils)) if name == REPORT else hand_out_page(title, records, pupils)
+    if name == REPORT:
+        return report_page(title, records, len(pupils))
+    return hand_out_page(title, hand_outs(records, pupils))
 
 
 # ---- the files -----------------------------------------------------------------------------------------------------------
@@ -223,12 +227,13 @@ def write_report(roster: Roster, rows: Sequence[Json] | None = None) -> Json:
     records, pupils, title = class_record(roster), [*roster.pupils], title_of_class(roster)
     if rows is None:
         rows = [asdict(row) for record in records for row in record.finished]
+    handed = hand_outs(records, pupils)
     pages = {
         TABLE: csv_of(rows, COLUMNS),
         REPORT: report_page(title, records, len(pupils)),
-        HAND_OUTS: hand_out_page(title, records, pupils),
+        HAND_OUTS: hand_out_page(title, handed),
     }
-    pages |= {f"{pupil.folder}/{HAND_OUT}": hand_out_page(title, records, [pupil]) for pupil in pupils}
+    pages |= {f"{one[0].folder}/{HAND_OUT}": hand_out_page(title, [one]) for one in handed}
     for name, text in pages.items():
         path = roster.folder / name
         try:

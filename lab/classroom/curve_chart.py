@@ -12,6 +12,7 @@ MOST_BLOCKS = 80  # points of a curve; of a longer one each is the mean of a blo
 MOST_TICKS = 6
 STEEP = 4.0  # with values so many times as large as the least, the axis is logarithmic
 Kind = Literal["believed", "dropped", "open", "best", "own", "middle"]  # of a line, which styles it
+Point = tuple[float, float, bool]  # the middle of a block [episodes], its mean, whether an episode of it was advised
 Curve = Sequence[tuple[float, bool]]  # of each episode its steps or cost, and whether it was advised
 
 
@@ -38,29 +39,48 @@ class Chart:
     wide, high, left, right, bottom = WIDE, HIGH, LEFT, WIDE - RIGHT, HIGH - BOTTOM
 
 
+@dataclass(frozen=True)
+class Middle:
+    """The median of several curves: its points, of blocks of so many episodes."""
+
+    block: int
+    points: tuple[Point, ...]
+
+
+def middle_of(curves: Sequence[Curve]) -> Middle | None:
+    """The median of the curves, as far as half of them reach; None for fewer than two with an episode."""
+    known = [finite for curve in curves if (finite := _finite(curve))]
+    if len(known) < 2:
+        return None
+    block = _block(max(map(len, known)))
+    parts = [_blocks(curve, block) for curve in known]
+    longest, enough = max(parts, key=len), ceil(len(parts) / 2)
+    there = [[part[k][1] for part in parts if k < len(part)] for k in range(len(longest))]
+    points = [(longest[k][0], median(values), False) for k, values in enumerate(there) if len(values) >= enough]
+    return Middle(block, tuple(points))
+
+
 def chart_of(
     curves: Sequence[tuple[Kind, str, Curve]],
     best: float | None,
-    middle_of: Sequence[Curve] = (),
+    middle: Middle | None = None,
     *,
     from_zero: bool = True,
 ) -> Chart | None:
     """The chart of several curves, each (kind, name, values); None if none of them has an episode.
 
-    best: the least value possible; middle_of: the curves whose median is a line of its own, if there are at least two; from_zero:
-    whether a linear axis begins at 0.
+    best: the least value possible; middle: the median of the curves, or of more than these; from_zero: whether a linear axis
+    begins at 0.
     """
-    known = [(kind, name, _finite(curve)) for kind, name, curve in curves]
-    others = [values for curve in middle_of if (values := _finite(curve))]
-    longest = max((len(curve) for _, _, curve in known), default=0)
-    if not longest:
+    known = [(kind, name, finite) for kind, name, curve in curves if (finite := _finite(curve))]
+    if not known:
         return None
-    block = ceil(longest / MOST_BLOCKS)
-    drawn = [(kind, name, _blocks(curve, block)) for kind, name, curve in known if curve]
-    if len(others) > 1:
-        middle = [point for point in _middle([_blocks(curve, block) for curve in others]) if point[0] <= longest]
-        drawn.append(("middle", "median of all", middle))
-    values = [value for _, _, points in drawn for _, value, _ in points] + [best] * (best is not None)
+    longest = max(len(curve) for _, _, curve in known)
+    block = _block(longest) if middle is None else middle.block
+    drawn = [(kind, name, _blocks(curve, block)) for kind, name, curve in known]
+    if middle is not None:
+        drawn.append(("middle", "median of all", [point for point in middle.points if point[0] <= longest]))
+    values = [value for _, _, points in drawn for _, value, _ in points] + ([] if best is None else [best])
     x_axis, y_axis = _Axis(0.0, float(longest), LEFT, WIDE - RIGHT, False), _y_axis(values, from_zero)
     lines = []
     for kind, name, points in drawn:
@@ -76,7 +96,9 @@ def _finite(curve: Curve) -> Curve:
     return [one for one in curve if isfinite(one[0])]
 
 
-Point = tuple[float, float, bool]  # the middle of a block [episodes], its mean, whether an episode of it was advised
+def _block(episodes: int) -> int:
+    """The episodes a point, for a curve of so many."""
+    return ceil(episodes / MOST_BLOCKS)
 
 
 def _blocks(curve: Curve, block: int) -> list[Point]:
@@ -87,14 +109,6 @@ def _blocks(curve: Curve, block: int) -> list[Point]:
         mean = sum(value for value, _ in part) / len(part)
         points.append((first + (len(part) + 1) / 2, mean, any(advised for _, advised in part)))
     return points
-
-
-def _middle(curves: Sequence[Sequence[Point]]) -> list[Point]:
-    """The median of the curves, block by block, as far as half of them reach."""
-    enough = ceil(len(curves) / 2)
-    longest = max(curves, key=len)
-    there = [[curve[k][1] for curve in curves if k < len(curve)] for k in range(len(longest))]
-    return [(longest[k][0], median(values), False) for k, values in enumerate(there) if len(values) >= enough]
 
 
 @dataclass(frozen=True)

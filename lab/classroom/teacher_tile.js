@@ -42,7 +42,7 @@ const classTile = (() => {
     return svg;
   }
 
-  const best = ({ kind, best: least, optimal }) => (kind !== "order" || least === null ? "" : `; best order ${Math.round(least)}${optimal ? `, bound ${Math.round(optimal)}` : ""}`);
+  const best = ({ kind, best: least, optimal, proven }) => (kind !== "order" || least === null ? "" : `; best order ${Math.round(least)}${optimal ? `, ${proven ? "optimum" : "bound"} ${Math.round(optimal)}` : ""}`);
 
   function status(tile) {
     if (tile.state === "idle") return [tile.study ? tile.study.doing : "", tile.study && tile.study.doing === "finished" ? "over" : ""];

@@ -32,6 +32,7 @@ def tile_of(pupil: Pupil, desk: Desk, here: bool, asked_s: float | None) -> Json
         "episodes": lesson.get("episodes", 0),
         "kind": lesson.get("kind", "steps"),
         "optimal": lesson.get("optimal"),
+        "proven": lesson.get("proven", True),
         "best": (curve.get("best") or [None])[0],
         "curve": _thinned(curve.get("means", [])),
         "guided": _thinned(curve.get("guided", [])),
