@@ -6,10 +6,12 @@ const classBar = (() => {
   const TICK_MS = 500;
   let study = null, until = 0;
 
-  function show({ name, lesson, lessons, paused, hint, helped, study: now }) {
+  function show({ name, lesson, lessons, paused, hint, helped, team, fellows, late, study: now }) {
     el("class").hidden = false;
     el("class-name").textContent = name;
     el("class-lesson").textContent = lessons > 1 ? `lesson ${lesson} of ${lessons}` : "";
+    el("class-team").hidden = !team;
+    if (team) el("class-team").textContent = `${team}${fellows.length ? `, with ${fellows.join(", ")}` : ""}${late ? ": it has begun without you, so you watch until the next lesson" : ""}`;
     el("class-hint").hidden = !hint;
     el("class-hint").textContent = hint ? `Hint: ${hint}` : "";
     el("class-helped").hidden = !helped;

@@ -46,7 +46,9 @@ def files_of(hosts: Sequence[str], port: int, of_study: bool = False) -> dict[st
     def file(name: str) -> File:
         return File((HERE / name).read_bytes(), KINDS[Path(name).suffix], policy)
 
-    shared = {name: file(name) for name in ("class.css", "join.js", "teacher.js", "teacher_tile.js")}
+    shared = {
+        name: file(name) for name in ("class.css", "join.js", "teacher.js", "teacher_tile.js", "teacher_teams.js")
+    }
     desk = page_files("Teaching lab", [*SeatPanel.files, *(HERE / f"class_bar{kind}" for kind in KINDS)])
     desk[""] = File(desk[""].content, desk[""].kind, SERVED.replace("ws://127.0.0.1:* ws://localhost:*", sockets))
     steps = {name: file(name) for name in ("class.css", "step.css", "step_items.js", "step.js")} | {

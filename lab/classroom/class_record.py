@@ -176,7 +176,7 @@ class LessonRecord:
 
 def class_record(roster: Roster) -> list[LessonRecord]:
     """The lessons of a class with what its folder holds of each pupil's."""
-    pupils = [*roster.pupils]
+    pupils = roster.learners
     records = []
     for number, lesson in enumerate(roster.lessons):
         about_order = lesson.command == "sequence"

@@ -36,6 +36,7 @@ from lab.classroom.roster import Full, Roster
 from lab.classroom.step_pages import StepPages
 from lab.classroom.study import Study
 from lab.classroom.study_room import StudyRoom
+from lab.classroom.team_room import TeamRoom
 from lab.classroom.tile import COLUMNS
 from lab.classroom.wrong_codes import WrongCodes
 from lab.errors import BadInput, WorkFailed
@@ -129,7 +130,7 @@ class ClassServer:
     async def _serve(self) -> None:
         self._loop, self._stopped = asyncio.get_running_loop(), asyncio.Event()
         self._loop.set_exception_handler(quiet_when_full)
-        self.room = Room(self.roster) if self._study is None else StudyRoom(self._study)
+        self.room = self._made_room()
         self.room.on_news = self._stir
         server = Uvicorn(config_of(self._application(), **self._secured))
         serving = asyncio.create_task(server.serve(sockets=[self._socket]))
@@ -143,6 +144,11 @@ class ClassServer:
             connection.transport.abort()
         self._socket.close()
         await asyncio.sleep(0)
+
+    def _made_room(self) -> Room:
+        if self._study is not None:
+            return StudyRoom(self._study)
+        return TeamRoom(self.roster) if self.roster.teams else Room(self.roster)
 
     # ---- what is served
 
@@ -258,7 +264,7 @@ class ClassServer:
         """Pass messages between a browser and its desk, until one of them leaves."""
         desk = self.room.desks[page.number]
         try:
-            upstream = await desk.page(watches=not sits)
+            upstream = await desk.page(not sits, self.room.name_at(page.number))
         except OSError:
             if desk.is_closed or desk.state in ("idle", "over", "failed", "stopped"):
                 await self._show_last(browser, page)
@@ -339,7 +345,10 @@ class ClassServer:
         seen, told = dict[int, Any](), dict[str, Any]()
         while True:
             stirred.clear()
-            tiles, now = self.room.tiles(), {"class": self._known(), "rows": self.room.rows()}
+            tiles, now = (
+                self.room.tiles(),
+                {"class": self._known(), "rows": self.room.rows(), "teams": self.room.teams()},
+            )
             news = {part: value for part, value in now.items() if told.get(part) != value}
             changed = [tile for number, tile in tiles.items() if seen.get(number) != tile]
             gone = [number for number in seen if number not in tiles]
@@ -376,6 +385,8 @@ class ClassServer:
                     room.go_on(number)
                 case {"do": "lesson", "pupil": int() | None as number, "lesson": int(lesson)}:
                     room.go_on(number, lesson - 1)
+                case {"do": "begin"}:
+                    room.begin_lessons()
                 case {"do": "open", "pupil": int(number)}:
                     room.open_again(number)
                 case {"do": "end"}:

@@ -38,8 +38,8 @@ class Desk:
 
     on_news: called when the shown document or the state has changed. state: "idle" for a desk that has no process by intent.
     parts: the newest parts of the page's document, of a team that of the one who is first. questions: the pending questions by
-    the names of those who teach together, "" for one pupil alone. result: the lesson's document, once it is over.
-    text: why it failed.
+    the names of those who teach together, "" for one pupil alone. people: these names, once the process has begun.
+    result: the lesson's document, once it is over. text: why it failed.
     """
 
     def __init__(self, order: DeskOrder) -> None:
@@ -51,6 +51,7 @@ class Desk:
         self.text = ""
         self.ready = asyncio.Event()  # the page answers, or never will
         self.questions: dict[str, Json] = {}
+        self.people: tuple[str, ...] = ()
         self._addresses: dict[str, str] = {}
         self._loop = asyncio.get_running_loop()
         self._pipe: Connection | None = None
@@ -129,7 +130,7 @@ class Desk:
                 self._addresses = {
                     name: f"ws://127.0.0.1:{port}/frames?token={token}" for name, (port, token) in pages.items()
                 }
-                self.state = "open"
+                self.state, self.people = "open", tuple(self._addresses)
                 self.ready.set()
                 self._watching = [asyncio.create_task(self._watch(name)) for name in self._addresses]
             case ("over", document):

@@ -78,7 +78,7 @@ class Room:
     async def end(self) -> None:
         """Close all desks: lessons that are not over can be resumed."""
         self.ended.set()
-        await asyncio.gather(*(desk.close() for desk in self.desks.values()))
+        await asyncio.gather(*(desk.close() for desk in {*self.desks.values()}))
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
     # ---- desks
@@ -89,16 +89,23 @@ class Room:
 
     def seat(self, pupil: Pupil) -> None:
         """Open the desk of a pupil at the pupil's lesson: the lesson begins, goes on, or is shown if it is over."""
-        folder, toolbox = self.folder(pupil, pupil.lesson), self.toolbox(pupil)
-        order = DeskOrder(self.roster.lessons[pupil.lesson], folder, toolbox, modules=self.roster.modules)
         before = self.desks.get(pupil.number)
-        desk = self.desks[pupil.number] = Desk(order)
+        desk = self.desks[pupil.number] = Desk(self.order(pupil))
         desk.on_news = lambda: self._stirred(pupil.number, desk)
-        kept = kept_lesson(order.folder)
+        self._place(desk, before, self.opens(pupil))
+
+    def order(self, learner: Pupil) -> DeskOrder:
+        """What is taught at the desk of one of the roster's `learners`."""
+        folder, toolbox = self.folder(learner, learner.lesson), self.toolbox(learner)
+        return DeskOrder(self.roster.lessons[learner.lesson], folder, toolbox, modules=self.roster.modules)
+
+    def _place(self, desk: Desk, before: Desk | None, opens: bool) -> None:
+        """Put a desk in the place of another one; opens: whether a lesson that is not over gets a process."""
+        kept = kept_lesson(desk.order.folder)
         if kept is not None:
             desk.state, desk.result, desk.parts = "over", kept["document"], kept["page"]
             desk.ready.set()
-        elif not self.opens(pupil):
+        elif not opens:
             desk.state = "idle"
             desk.ready.set()
         else:
@@ -132,11 +139,7 @@ class Room:
         """Something of a desk has changed: keep a finished lesson, note when a question came."""
         if self.desks.get(number) is not desk:
             return  # it was closed, and another one is in its place
-        question = desk.parts.get("question")
-        if not question:
-            self._asked.pop(number, None)
-        elif self._asked.get(number, (0, 0.0))[0] != question["number"]:
-            self._asked[number] = (question["number"], time.monotonic())
+        self._pose(number, desk)
         if desk.state == "over" and desk.parts.get("ended") and not is_file(desk.order.folder / KEPT):
             kept = {"document": desk.result, "page": desk.parts}
             with suppress(OSError):  # a full disk: the journal has been written, and the lesson is over anyway
@@ -148,7 +151,19 @@ class Room:
                 self.open_again(number)
         self.on_news()
 
+    def _pose(self, number: int, desk: Desk) -> None:
+        """Note when a question has come to a pupil."""
+        question = desk.questions.get(self.name_at(number))
+        if not question:
+            self._asked.pop(number, None)
+        elif self._asked.get(number, (0, 0.0))[0] != question["number"]:
+            self._asked[number] = (question["number"], time.monotonic())
+
     # ---- pupils' pages
+
+    def name_at(self, number: int) -> str:
+        """The name of a pupil's page at the desk: "" unless several teach there."""
+        return ""
 
     def arrived(self, page: PupilPage) -> None:
         """A pupil's page is open; an older one of the same pupil, perhaps behind a closed lid, is closed."""
@@ -245,14 +260,22 @@ class Room:
             if page := self.pages.get(pupil.number):
                 self._start(page.close(RELOAD))
 
+    def begin_lessons(self) -> None:
+        """Begin the lessons that wait for the teacher. Raises BadInput if none does."""
+        raise BadInput("no lesson waits: each pupil's begins when the pupil has joined")
+
     def open_again(self, number: int) -> None:
         """Open a desk again whose process has ended or failed. Raises BadInput if it has not."""
         pupil = self._pupil(number)
-        if self.desks[number].state in ("idle", "opening", "open", "over"):
-            raise BadInput(f"desk {number} is {self.desks[number].state}: nothing is to be mended")
+        self._check_closed(number)
         self.seat(pupil)
         if page := self.pages.get(number):
             self._start(page.close(RELOAD))
+
+    def _check_closed(self, number: int) -> None:
+        """Raises BadInput unless a desk's process has ended before its lesson was over."""
+        if (state := self.desks[number].state) in ("idle", "opening", "open", "over"):
+            raise BadInput(f"desk {number} is {state}: nothing is to be mended")
 
     def _pupil(self, number: int) -> Pupil:
         if not 1 <= number <= len(self.roster.pupils) or self.roster.pupils[number - 1].is_gone:
@@ -273,6 +296,7 @@ class Room:
             pupil.number: tile_of(
                 pupil,
                 self.desks[pupil.number],
+                self.desks[pupil.number].questions.get(self.name_at(pupil.number)),
                 pupil.number in self.pages,
                 now_s - self._asked[pupil.number][1] if pupil.number in self._asked else None,
             )
@@ -284,15 +308,23 @@ class Room:
         """The rows of all finished lessons: lesson by lesson, best teacher first."""
         rows: list[Json] = []
         for lesson in range(len(self.roster.lessons)):
-            finished = [(pupil, self._document(pupil, lesson)) for pupil in self.roster.present]
-            rows += best_first([row_of(pupil, lesson, document) for pupil, document in finished if document])
+            finished = [(learner, self._document(learner, lesson)) for learner in self.roster.learners]
+            rows += best_first([row_of(learner, lesson, document) for learner, document in finished if document])
         return rows
 
-    def _document(self, pupil: Pupil, lesson: int) -> Json | None:
-        if lesson == pupil.lesson:
-            result = self.desks[pupil.number].result
+    def teams(self) -> list[Json]:
+        """What the teacher sees of each team; none in a class without teams."""
+        return []
+
+    def _document(self, learner: Pupil, lesson: int) -> Json | None:
+        if lesson == learner.lesson:
+            result = self.desk_of(learner).result
             return None if result is None else dict(result)
-        if (pupil.number, lesson) not in self._finished:
-            kept = kept_lesson(self.folder(pupil, lesson))
-            self._finished[pupil.number, lesson] = None if kept is None else dict(kept["document"])
-        return self._finished[pupil.number, lesson]
+        if (learner.number, lesson) not in self._finished:
+            kept = kept_lesson(self.folder(learner, lesson))
+            self._finished[learner.number, lesson] = None if kept is None else dict(kept["document"])
+        return self._finished[learner.number, lesson]
+
+    def desk_of(self, learner: Pupil) -> Desk:
+        """The desk of one of the roster's `learners`."""
+        return self.desks[learner.number]

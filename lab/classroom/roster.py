@@ -24,6 +24,7 @@ FILE = "class.json"
 FORMAT: Final = "teaching-lab class 1"
 MOST_BYTES = 1 << 22
 MOST_PUPILS = 60
+MOST_TEAMS = 12
 MOST_PARTICIPANTS = 500  # of a study, who are not all there at once
 NAME_LENGTH = 24
 LETTERS = "23456789abcdefghjkmnpqrstuvwxyz"  # without those that look alike
@@ -43,6 +44,8 @@ ANIMALS = (
 class Pupil:
     """A pupil: a number from 1 on, a name, the SHA-256 of the key in the pupil's address, and the current lesson's number.
 
+    team: the number of the pupil's team from 1 on, 0 in a class without teams.
+
     A participant who has withdrawn leaves the number alone: name and hash are "", and nobody gets the number again.
     """
 
@@ -50,6 +53,7 @@ class Pupil:
     name: str
     key_hash: str
     lesson: int = 0
+    team: int = 0
 
     @property
     def is_gone(self) -> bool:
@@ -90,6 +94,7 @@ class _Kept:
     port: Annotated[int, Ge(0), Le(65535)]
     pupils: list[Pupil]
     study: StudyEntry | None = None
+    teams: Annotated[int, Ge(0), Le(MOST_TEAMS)] = 0
 
 
 class Full(Exception):
@@ -102,7 +107,7 @@ class Roster:
 
     code: what pupils type to join; port: of the last server, so that pupils' pages find the next one; typed_names: whether
     pupils choose their names; modules: those that the teacher has named for lessons such as gym:MODULE:ID, which is not kept;
-    study: of a class that is a study.
+    study: of a class that is a study; teams: in how many teams the pupils teach, 0 if each teaches alone.
     """
 
     folder: Path
@@ -115,6 +120,7 @@ class Roster:
     pupils: list[Pupil] = field(default_factory=list)
     modules: tuple[str, ...] = ()
     study: StudyEntry | None = None
+    teams: int = 0
 
     @classmethod
     def new(cls, folder: Path, lessons: Sequence[ClassLesson], seed: int, most: int, typed_names: bool) -> "Roster":
@@ -155,10 +161,12 @@ class Roster:
                 f"{where}: {len(kept.study.positions)} positions, {len(kept.pupils)} pupils: a file of lab class is wanted"
             )
         for number, pupil in enumerate(kept.pupils, start=1):
-            if pupil.number != number or clean_name(pupil.name) != pupil.name or not 0 <= pupil.lesson < len(lessons):
+            is_named = pupil.number == number and clean_name(pupil.name) == pupil.name
+            is_placed = 0 <= pupil.lesson < len(lessons) and (0 if kept.teams == 0 else 1) <= pupil.team <= kept.teams
+            if not (is_named and (is_placed or pupil.is_gone)):
                 raise BadInput(f"{where}: pupil {number} is {asdict(pupil)}: a file of lab class is wanted")
         read = cls(folder, kept.code, lessons, kept.seed, kept.most, kept.typed_names, kept.port, kept.pupils)
-        read.study = kept.study
+        read.study, read.teams = kept.study, kept.teams
         return read
 
     def write(self) -> None:
@@ -166,7 +174,8 @@ class Roster:
         self.folder.mkdir(parents=True, exist_ok=True)
         lessons = [lesson_to_json(lesson) for lesson in self.lessons]
         kept = _Kept(
-            FORMAT, self.code, lessons, self.seed, self.most, self.typed_names, self.port, self.pupils, self.study
+            *(FORMAT, self.code, lessons, self.seed, self.most, self.typed_names, self.port, self.pupils),
+            *(self.study, self.teams),
         )
         record = {name: value for name, value in asdict(kept).items() if name != "study" or value is not None}
         write_whole(self.folder / FILE, (json.dumps(record, indent=1) + "\n").encode())
@@ -174,7 +183,7 @@ class Roster:
     # ---- pupils
 
     def lesson_folder(self, pupil: Pupil, lesson: int) -> Path:
-        """The folder of a pupil's lesson (from 0)."""
+        """The folder of a lesson (from 0) of a pupil, or of a team as it is among `learners`."""
         return self.folder / pupil.folder / f"lesson-{lesson + 1}"
 
     def join(self, code: str, name: str = "") -> tuple[Pupil, str] | None:
@@ -187,7 +196,12 @@ class Roster:
         self.check_room()
         wanted = clean_name(name) if self.typed_names else ""
         key = token_urlsafe(16)
-        pupil = Pupil(len(self.pupils) + 1, self._free(wanted or self._pseudonym()), hash_of(key))
+        team = min(range(1, self.teams + 1), key=lambda team: len(self.members(team)), default=0)
+        fellows = self.members(team)
+        lesson = fellows[0].lesson if team and fellows else 0
+        pupil = Pupil(
+            len(self.pupils) + 1, self._free(wanted or self._pseudonym()), hash_of(key), lesson=lesson, team=team
+        )
         self.pupils.append(pupil)
         self.write()
         return pupil, key
@@ -205,6 +219,18 @@ class Roster:
     def present(self) -> list[Pupil]:
         """The pupils, without the numbers of those who have withdrawn."""
         return [pupil for pupil in self.pupils if not pupil.is_gone]
+
+    def members(self, team: int) -> list[Pupil]:
+        """The pupils of a team."""
+        return [pupil for pupil in self.present if pupil.team == team]
+
+    @property
+    def learners(self) -> list[Pupil]:
+        """Whose learners there are: the pupils, or teams with anybody in them, with the numbers and names of teams."""
+        if not self.teams:
+            return self.present
+        begun = [(team, self.members(team)) for team in range(1, self.teams + 1)]
+        return [Pupil(team, f"team {team}", "", pupils[0].lesson) for team, pupils in begun if pupils]
 
     def admit(self, key: str, name: str = "") -> tuple[Pupil, int]:
         """A new participant of a study, who has agreed, and the position in its design. name: "" for a pseudonym.

@@ -84,10 +84,11 @@ function follow(pause = 300) {
   socket = new WebSocket(new URL(`frames${location.search}`, location.href.replace(/^http/, "ws")));
   socket.onopen = () => { pause = 300; };
   socket.onmessage = (event) => {
-    const { class: now, rows, tiles, gone, refusal } = JSON.parse(event.data);
+    const { class: now, rows, tiles, teams, gone, refusal } = JSON.parse(event.data);
     el("told").textContent = refusal || "";
     if (now) showClass(now);
     if (rows) showRows(rows);
+    if (teams) classTeams.show(teams);
     if (tiles) showTiles(tiles, gone);
   };
   socket.onclose = () => {
@@ -96,6 +97,7 @@ function follow(pause = 300) {
   };
 }
 
+el("begin").onclick = () => say({ do: "begin" });
 el("pause").onclick = () => say({ do: "pause", on: !paused });
 el("all").onclick = () => say({ do: "lesson", pupil: null, lesson: Number(el("lesson").value) });
 el("board").onclick = () => {

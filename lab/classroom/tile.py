@@ -16,10 +16,14 @@ COLUMNS = (
 )
 
 
-def tile_of(pupil: Pupil, desk: Desk, here: bool, asked_s: float | None) -> Json:
-    """The tile; here: whether the pupil's page is open; asked_s: how long [s] a question has waited, None: none does."""
+def tile_of(pupil: Pupil, desk: Desk, question: Json | None, here: bool, asked_s: float | None) -> Json:
+    """The tile of a pupil.
+
+    question: the one that waits for the pupil, asked_s: how long [s] it has waited, None for none; here: whether the pupil's page
+    is open.
+    """
     lesson, standing = desk.parts.get("lesson") or {}, desk.parts.get("standing") or {}
-    curve, question = desk.parts.get("curve") or {}, desk.parts.get("question")
+    curve = desk.parts.get("curve") or {}
     return {
         "number": pupil.number,
         "name": pupil.name,
@@ -34,8 +38,8 @@ def tile_of(pupil: Pupil, desk: Desk, here: bool, asked_s: float | None) -> Json
         "optimal": lesson.get("optimal"),
         "proven": lesson.get("proven", True),
         "best": (curve.get("best") or [None])[0],
-        "curve": _thinned(curve.get("means", [])),
-        "guided": _thinned(curve.get("guided", [])),
+        "curve": thinned(curve.get("means", [])),
+        "guided": thinned(curve.get("guided", [])),
         "asks": question["title"] if question else "",
         "asked_s": None if asked_s is None else round(asked_s),
         "taken": standing.get("taken", 0),
@@ -97,7 +101,7 @@ def best_first(rows: list[Json]) -> list[Json]:
     )
 
 
-def _thinned(values: list[float]) -> list[float]:
+def thinned(values: list[float]) -> list[float]:
     """At most MOST_POINTS of the values, evenly spread, the last included."""
     if len(values) <= MOST_POINTS:
         return values

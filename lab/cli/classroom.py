@@ -48,6 +48,15 @@ def hold_class(
         ),
     ] = None,
     pupils: Annotated[int, typer.Option("--pupils", min=1, max=60, help="The number of seats.")] = PUPILS,
+    teams: Annotated[
+        int,
+        typer.Option(
+            "--teams",
+            min=0,
+            max=12,
+            help="The pupils teach in so many teams, each with one learner that judges whom of them to believe; 0: each alone.",
+        ),
+    ] = 0,
     typed_names: Annotated[
         bool, typer.Option("--typed-names", help="Pupils type their names; by default each is given a pseudonym.")
     ] = False,
@@ -110,11 +119,13 @@ def hold_class(
             "--episodes": episodes,
             "--seed": seed,
             "--pupils": pupils != PUPILS,
+            "--teams": teams,
         }
         held = _study(study, out, tuple(trust_module or ()), [name for name, value in given.items() if value])
         roster = held.roster
     else:
         roster = _new(lessons or [], out, pupils, typed_names, seed, (task, learner, gate, episodes))
+        roster.teams = _checked_teams(teams, roster)
         roster.modules = tuple(filter(None, map(deferred.module_of, roster.lessons)))
     _check(roster)
     place = deferred.place_of(lan, name or (), certificate, key)
@@ -166,6 +177,16 @@ def _study(file: Path, out: Path | None, modules: tuple[str, ...], beside: list[
     held = deferred.StudyWithPeople.new(file, out, lambda lesson: _check_lesson(lesson, str(file), modules))
     held.roster.modules = modules
     return held
+
+
+def _checked_teams(teams: int, roster: "deferred.Roster") -> int:
+    """The number of teams. Raises BadInput for teams in a class that has a lesson on an order."""
+    for lesson in roster.lessons if teams else ():
+        if lesson.command == "sequence":
+            raise BadInput(
+                f"--teams {teams} with the lesson '{deferred.name_of(lesson)}': teams advise one table, no order"
+            )
+    return teams
 
 
 def _check(roster: "deferred.Roster") -> None:

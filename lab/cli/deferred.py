@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from lab.audit.audit import audit, kept_evidence
     from lab.classroom.class_lesson import ADVISORS as PUPILS
     from lab.classroom.class_lesson import ORDER as ORDER_LESSON
-    from lab.classroom.class_lesson import ClassLesson, check_lesson, module_of, order_lesson_named
+    from lab.classroom.class_lesson import ClassLesson, check_lesson, module_of, name_of, order_lesson_named
     from lab.classroom.class_report import write_report
     from lab.classroom.class_server import ClassServer
     from lab.classroom.code_picture import code_text
@@ -156,6 +156,7 @@ TABLE = {
         "check_lesson",
         "ClassLesson",
         "module_of",
+        "name_of",
         "ORDER as ORDER_LESSON",
         "order_lesson_named",
     ),
