@@ -373,6 +373,11 @@ def is_external(name: str) -> bool:
     return split_praise(name)[0] in PEOPLE or name.startswith((MODEL, PAGE_OF))
 
 
+def shown_name(name: str) -> str:
+    """An advisor's name for people: of one of several people, the person's."""
+    return name.removeprefix(PAGE_OF)
+
+
 def named() -> list[str]:
     """The names without parameters."""
     return [name for name in ADVISORS if not {"=", ":"} & {*name}]

@@ -31,6 +31,7 @@ from lab.classroom.class_lesson import title_of
 from lab.classroom.class_place import Place, files_of
 from lab.classroom.class_report import HAND_OUTS, POLICY, REPORT, page_now
 from lab.classroom.code_picture import code_svg
+from lab.classroom.desk import nothing_shown
 from lab.classroom.room import OVER, RELOAD, PupilPage, Room
 from lab.classroom.roster import Full, Roster
 from lab.classroom.step_pages import StepPages
@@ -292,7 +293,7 @@ class ClassServer:
     async def _show_last(self, browser: WebSocket, page: PupilPage) -> None:
         """Show how a lesson ended whose process is not there any more, until the browser leaves."""
         desk = self.room.desks[page.number]
-        shown = desk.parts | {"you": {"seat": False, "free": False, "pages": 1}}
+        shown = nothing_shown() | desk.parts | {"you": {"seat": False, "free": False, "pages": 1}}
         if desk.state != "over":
             shown |= {"ended": self.room.closed_text(page.number)}
         await page.send(json.dumps({"seat": shown}))

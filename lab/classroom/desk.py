@@ -16,6 +16,8 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, WebSocketException
 
 from lab.classroom.desk_process import DeskOrder, sit
+from lab.seat.page.page_state import PARTS, PageContent
+from lab.seat.page.teaching_page import TITLE
 
 Json = dict[str, Any]
 State = Literal["idle", "opening", "open", "over", "failed", "stopped", "lost"]
@@ -31,6 +33,12 @@ def processes() -> Any:
     context = get_context("forkserver")
     context.set_forkserver_preload(PRELOADED)
     return context
+
+
+def nothing_shown() -> Json:
+    """The parts of a page's document before a lesson has begun."""
+    empty = PageContent(TITLE)
+    return {part: PARTS[part](empty, 0.0) for part in KEPT}
 
 
 class Desk:

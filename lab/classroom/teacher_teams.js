@@ -20,18 +20,21 @@ const classTeams = (() => {
   function race(teams) {
     const svg = drawn("svg", { viewBox: `0 0 ${WIDE} ${HIGH}`, role: "img", "aria-label": "the learning curves of the teams" });
     const values = teams.flatMap((team) => team.curve), most = Math.max(1, ...values);
-    const last = Math.max(1, ...teams.map((team) => team.episodes || team.episode));
-    const x = (share, team) => EDGE + (WIDE - 2 * EDGE - 40) * share * (team.episode / last), y = (value) => 10 + (HIGH - 34) * (1 - value / most);
+    const last = Math.max(1, ...teams.map((team) => team.episode)), placed = [];
+    const x = (share, team) => EDGE + (WIDE - 2 * EDGE - 60) * share * (team.episode / last), y = (value) => 10 + (HIGH - 34) * (1 - value / most);
     svg.append(drawn("line", { x1: EDGE, y1: y(0), x2: WIDE - EDGE, y2: y(0), class: "axis" }), drawn("line", { x1: EDGE, y1: y(0), x2: EDGE, y2: 10, class: "axis" }));
     svg.append(drawn("text", { x: EDGE - 4, y: y(most) + 5, "text-anchor": "end" }, String(Math.round(most))), drawn("text", { x: EDGE - 4, y: y(0), "text-anchor": "end" }, "0"));
-    svg.append(drawn("text", { x: WIDE - EDGE, y: HIGH - 6, "text-anchor": "end" }, `episode ${last}`), drawn("text", { x: EDGE, y: HIGH - 6 }, "steps of each episode"));
+    svg.append(drawn("text", { x: WIDE - EDGE - 60, y: HIGH - 6, "text-anchor": "end" }, `episode ${last}`), drawn("text", { x: EDGE, y: HIGH - 6 }, "steps of each episode"));
     const optimal = teams.map((team) => team.optimal).find((value) => value !== null);
-    if (optimal) svg.append(drawn("line", { x1: EDGE, y1: y(optimal), x2: WIDE - EDGE, y2: y(optimal), class: "best" }), drawn("text", { x: WIDE - EDGE, y: y(optimal) - 4, "text-anchor": "end" }, `fewest possible: ${optimal}`));
+    if (optimal) svg.append(drawn("line", { x1: EDGE, y1: y(optimal), x2: WIDE - EDGE, y2: y(optimal), class: "best" }), drawn("text", { x: EDGE + 4, y: y(optimal) + 13 }, `fewest possible: ${optimal}`));
     for (const team of teams.filter((one) => one.curve.length > 1)) {
       const points = team.curve.map((value, k) => `${x(k / (team.curve.length - 1), team).toFixed(1)},${y(value).toFixed(1)}`);
       svg.append(drawn("polyline", { points: points.join(" "), stroke: colour(team.team), "stroke-dasharray": DASHES[Math.floor((team.team - 1) / COLOURS.length) % DASHES.length] }));
       const [at, height] = points[points.length - 1].split(",").map(Number);
-      svg.append(drawn("text", { x: at + 5, y: height + 4, class: "name" }, team.name));
+      let beside = Math.min(height + 4, y(0) - 2);
+      while (placed.some((other) => Math.abs(other - beside) < 14)) beside -= 14; // names of curves that end together
+      placed.push(beside);
+      svg.append(drawn("text", { x: at + 5, y: beside, class: "name" }, team.name));
       svg.lastChild.style.fill = colour(team.team);
     }
     return svg;
@@ -55,8 +58,8 @@ const classTeams = (() => {
   function member(name, known) {
     const made = make("li", ""), judged = known ? known.good + known.bad : 0;
     made.append(make("b", name));
-    if (!known) made.append(make("span", "not asked yet", "small"));
-    else made.append(bar(known), make("span", known.dropped ? `dropped after ${judged} judged answers` : `${Math.round(100 * known.trust)} % (${Math.round(100 * known.low)} to ${Math.round(100 * known.high)}), ${judged} judged`, known.dropped ? "small dropped" : "small"));
+    if (!known) made.append(make("small", "not asked yet"));
+    else made.append(bar(known), make("small", known.dropped ? `dropped: its advice misled` : `${Math.round(100 * known.trust)} % (${Math.round(100 * known.low)} to ${Math.round(100 * known.high)}), ${judged} judged`, known.dropped ? "dropped" : ""));
     return made;
   }
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from lab.advice.advisors import PAGE_OF
+from lab.advice.advisors import shown_name
 from lab.learning.requests import AdvisorLeft, Reply, Request
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ class Team:
         self._show(known, {other: answer for other, answer in known.answers.items() if not answer.done()})
 
     def _show(self, known: _Round, left: "Mapping[str, Future[Reply]]") -> None:
-        names = [other.removeprefix(PAGE_OF) for other in left]
+        names = [shown_name(other) for other in left]
         for other in known.answers:
             if other in left and known.until_s is not None:
                 self.pages[other].hurry(known.until_s)

@@ -11,7 +11,7 @@ from dataclasses import asdict
 from math import inf
 from typing import Any
 
-from lab.advice.advisors import PAGE_OF
+from lab.advice.advisors import shown_name
 from lab.advice.journal import Undo
 from lab.errors import BadInput, counted
 from lab.learning.praise import Judgement
@@ -310,7 +310,7 @@ class SeatPage(LiveView):
     def members(self, members: Iterable[Any]) -> None:
         """Show several advisors: records with `name`, `trust`, `low`, `high` and `dropped`."""
         known = [asdict(member) for member in members]
-        self._show("members", [member | {"name": member["name"].removeprefix(PAGE_OF)} for member in known])
+        self._show("members", [member | {"name": shown_name(member["name"])} for member in known])
 
     def finished(self, text: str) -> None:
         """The lesson is over: show `text`, and ask nothing more."""
