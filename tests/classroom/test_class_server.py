@@ -204,6 +204,9 @@ def test_a_finished_lesson_is_a_row_of_the_table_and_is_shown_again(server: Clas
     head, row = table.decode().splitlines()
     assert status == 200
     assert dict(zip(head.split(","), row.split(","), strict=True))["state"] == "over"
+    for name in ("report.html", "hand-outs.html"):
+        status, written = asked(server, f"/teacher/{name}{teacher(server).partition('/teacher/')[2]}")
+        assert (status, server.roster.pupils[0].name in written.decode()) == (200, True)
     server.stop()
     with ClassServer(Roster.read(server.roster.folder), Place()) as again:
         shown = at_page(again, page, lambda opened: until(opened, lambda news: news.get("seat", {}).get("receipt")))
@@ -247,14 +250,16 @@ def test_without_its_key_nothing_of_a_pupil_is_reached(server: ClassServer) -> N
         with pytest.raises(InvalidStatus) as refused:
             at_page(server, page, question)
         assert refused.value.response.status_code in (403, 404)
-    assert asked(server, "/teacher/class.csv")[0] == 403
+    for name in ("class.csv", "report.html", "hand-outs.html"):
+        assert asked(server, f"/teacher/{name}")[0] == 403
 
 
 def test_a_pupil_may_not_teach(server: ClassServer) -> None:
     key = join(server)["page"].partition("token=")[2]
     with pytest.raises(InvalidStatus):
         at_page(server, f"/teacher/?token={key}", question)
-    assert asked(server, f"/teacher/class.csv?token={key}")[0] == 403
+    for name in ("class.csv", "report.html", "hand-outs.html"):
+        assert asked(server, f"/teacher/{name}?token={key}")[0] == 403
 
 
 @pytest.mark.parametrize(
