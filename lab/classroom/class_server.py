@@ -50,7 +50,7 @@ MOST_LOOKERS = 64  # pages that look over a shoulder
 WRONG, WRONG_S = 20, 60.0  # wrong codes that an address may try in so many seconds
 MOST_ADDRESSES = 1000
 MOST_BODY = 2048  # bytes of a request to join
-FREE = '"free": true'  # in a message about the seat
+FREE, TAKEN = '"free": true', '"free": false'  # in a message about the seat
 FRAMED_NOWHERE = f"{POLICY}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 
 
@@ -306,6 +306,8 @@ class ClassServer:
         with suppress(ConnectionClosed):
             async for message in upstream:
                 await page.send(message)
+                if FREE in message or TAKEN in message:
+                    page.sees_free = FREE in message
                 if sits and FREE in message and self.room.takes_free_seat(page.number):
                     await page.say({"seat": "take"})
 

@@ -13,6 +13,7 @@ from websockets.exceptions import ConnectionClosedError, InvalidStatus
 
 from lab.classroom.class_place import Place
 from lab.classroom.class_server import WRONG, ClassServer
+from lab.classroom.room import PupilPage, Room
 from lab.classroom.roster import Roster
 from lab.seat.lesson_seat import LessonSeat
 from lab.seat.run_progress import RunProgress
@@ -212,6 +213,28 @@ def test_a_finished_lesson_is_a_row_of_the_table_and_is_shown_again(server: Clas
         shown = at_page(again, page, lambda opened: until(opened, lambda news: news.get("seat", {}).get("receipt")))
         assert shown["seat"]["ended"]
         assert again.call(lambda: [row["state"] for row in again.room.rows()]) == ["over"]
+
+
+def test_a_pupil_gets_the_seat_back_when_help_ends_also_after_the_helping_page_was_closed(
+    tmp_path: Path, lesson: LessonOptions
+) -> None:
+    said: list[Json] = []
+
+    async def say(message: Json) -> None:
+        said.append(message)
+
+    async def helped_twice() -> None:
+        roster = Roster.new(tmp_path / "class", [lesson], 0, 3, False)
+        roster.join(roster.code)
+        room, page = Room(roster), PupilPage(1, say, say, say)
+        room.pages[1] = page
+        for page.sees_free in (True, False):  # the teacher's page was closed; it has the seat still
+            room.help(1, True)
+            room.help(1, False)
+        await room.end()
+
+    asyncio.run(helped_twice())
+    assert [message for message in said if "seat" in message] == [{"seat": "give"}, {"seat": "take"}, {"seat": "give"}]
 
 
 @pytest.mark.parametrize(
