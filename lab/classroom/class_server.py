@@ -52,7 +52,7 @@ TILES_EVERY_S = 0.25
 MOST_TEACHERS = 8  # open pages of the teacher
 MOST_LOOKERS = 64  # pages that look over a shoulder
 MOST_BODY = 2048  # bytes of a request to join
-FREE = '"free": true'  # in a message about the seat
+FREE, TAKEN = '"free": true', '"free": false'  # in a message about the seat
 FRAMED_NOWHERE = f"{POLICY}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 
 
@@ -305,6 +305,8 @@ class ClassServer:
         with suppress(ConnectionClosed):
             async for message in upstream:
                 await page.send(message)
+                if FREE in message or TAKEN in message:
+                    page.sees_free = FREE in message
                 if sits and FREE in message and self.room.takes_free_seat(page.number):
                     await page.say({"seat": "take"})
 

@@ -28,12 +28,16 @@ AT_ONCE = 2  # desks that are started at the same time
 
 @dataclass(eq=False)
 class PupilPage:
-    """An open page of a pupil: functions that send it text, close it, and give its desk a message as if it had sent it."""
+    """An open page of a pupil: functions that send it text, close it, and give its desk a message as if it had sent it.
+
+    sees_free: whether the seat was free when its desk last told the page of it.
+    """
 
     number: int
     send: Callable[[str], Any]
     close: Callable[[int], Any]
     say: Callable[[Json], Any] = field(default=lambda message: None)
+    sees_free: bool = False
 
 
 class Room:
@@ -233,6 +237,9 @@ class Room:
         for page in gives:
             if page is not None:
                 self._start(page.say({"seat": "give"}))
+        page = self.pages.get(number)
+        if not begins and page is not None and page.sees_free:  # the teacher's page was closed before
+            self._start(page.say({"seat": "take"}))
         self._show_all(number)
 
     def takes_free_seat(self, number: int) -> bool:

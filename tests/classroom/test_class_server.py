@@ -13,6 +13,7 @@ from websockets.exceptions import ConnectionClosedError, InvalidStatus
 
 from lab.classroom.class_place import Place
 from lab.classroom.class_server import ClassServer
+from lab.classroom.room import PupilPage, Room
 from lab.classroom.roster import Roster
 from lab.classroom.wrong_codes import WRONG
 from lab.seat.lesson_seat import LessonSeat
@@ -205,11 +206,36 @@ def test_a_finished_lesson_is_a_row_of_the_table_and_is_shown_again(server: Clas
     head, row = table.decode().splitlines()
     assert status == 200
     assert dict(zip(head.split(","), row.split(","), strict=True))["state"] == "over"
+    for name in ("report.html", "hand-outs.html"):
+        status, written = asked(server, f"/teacher/{name}{teacher(server).partition('/teacher/')[2]}")
+        assert (status, server.roster.pupils[0].name in written.decode()) == (200, True)
     server.stop()
     with ClassServer(Roster.read(server.roster.folder), Place()) as again:
         shown = at_page(again, page, lambda opened: until(opened, lambda news: news.get("seat", {}).get("receipt")))
         assert shown["seat"]["ended"]
         assert again.call(lambda: [row["state"] for row in again.room.rows()]) == ["over"]
+
+
+def test_a_pupil_gets_the_seat_back_when_help_ends_also_after_the_helping_page_was_closed(
+    tmp_path: Path, lesson: LessonOptions
+) -> None:
+    said: list[Json] = []
+
+    async def say(message: Json) -> None:
+        said.append(message)
+
+    async def helped_twice() -> None:
+        roster = Roster.new(tmp_path / "class", [lesson], 0, 3, False)
+        roster.join(roster.code)
+        room, page = Room(roster), PupilPage(1, say, say, say)
+        room.pages[1] = page
+        for page.sees_free in (True, False):  # the teacher's page was closed; it has the seat still
+            room.help(1, True)
+            room.help(1, False)
+        await room.end()
+
+    asyncio.run(helped_twice())
+    assert [message for message in said if "seat" in message] == [{"seat": "give"}, {"seat": "take"}, {"seat": "give"}]
 
 
 @pytest.mark.parametrize(
@@ -248,14 +274,16 @@ def test_without_its_key_nothing_of_a_pupil_is_reached(server: ClassServer) -> N
         with pytest.raises(InvalidStatus) as refused:
             at_page(server, page, question)
         assert refused.value.response.status_code in (403, 404)
-    assert asked(server, "/teacher/class.csv")[0] == 403
+    for name in ("class.csv", "report.html", "hand-outs.html"):
+        assert asked(server, f"/teacher/{name}")[0] == 403
 
 
 def test_a_pupil_may_not_teach(server: ClassServer) -> None:
     key = join(server)["page"].partition("token=")[2]
     with pytest.raises(InvalidStatus):
         at_page(server, f"/teacher/?token={key}", question)
-    assert asked(server, f"/teacher/class.csv?token={key}")[0] == 403
+    for name in ("class.csv", "report.html", "hand-outs.html"):
+        assert asked(server, f"/teacher/{name}?token={key}")[0] == 403
 
 
 @pytest.mark.parametrize(

@@ -23,6 +23,8 @@ Lab = Callable[..., Any]
         (["world-1", "nothing", "--out", "x"], "nothing"),
         (["world-1", "--out", "x", "--resume", "y"], "--resume y"),
         (["--resume", "y"], "holds no class"),
+        (["--report", "y"], "(--report) holds no class"),
+        (["world-1", "--report", "y"], "--report y beside"),
         (["world-1", "--out", "x", "--pupils", "0"], "--pupils"),
         (["world-1", "--out", "x", "--gate", "ccr"], "ccr"),
         (["order:nothing", "--out", "x"], "nothing"),
@@ -62,3 +64,17 @@ def test_code_that_is_named_in_the_file_alone_is_not_run(
     ran = lab("class", "--resume", str(tmp_path / "class"))
     assert (ran.code, ran.out) == (2, "")
     assert said in ran.err
+
+
+def test_a_report_is_written_of_a_class_that_is_over(lab: Lab, tmp_path: Path) -> None:
+    lesson = LessonOptions("world-1", advisors=ADVISORS)
+    roster = Roster.new(tmp_path / "class", [lesson], 0, 3, False)
+    roster.write()
+    roster.join(roster.code)
+    ran = lab("class", "--report", str(tmp_path / "class"), "--json")
+    assert (ran.code, ran.err) == (0, "")
+    files = [*ran.json["files"].values(), *(pupil["hand_out"] for pupil in ran.json["pupils"])]
+    assert len(files) == 4
+    assert all(Path(file).is_file() for file in files)
+    read = lab("class", "--report", str(tmp_path / "class"))
+    assert "report.html" in read.out
