@@ -275,7 +275,7 @@ class ClassServer:
         desk = self.room.desks[page.number]
         shown = desk.parts | {"you": {"seat": False, "free": False, "pages": 1}}
         if desk.state != "over":
-            shown |= {"ended": self.room.closed_text(page.number)}
+            shown |= {"question": None, "ended": self.room.closed_text(page.number)}
         await page.send(json.dumps({"seat": shown}))
         with suppress(WebSocketDisconnect):
             while True:
