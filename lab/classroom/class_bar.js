@@ -25,6 +25,7 @@ const classBar = (() => {
       return;
     }
     study = now;
+    el("class").classList.add("study");
     until = now.left_s === null ? null : performance.now() + 1000 * now.left_s;
     el("class-lesson").textContent = `step ${now.step} of ${now.steps}`;
     el("class-step").hidden = false;

@@ -295,7 +295,8 @@ class ClassServer:
         desk = self.room.desks[page.number]
         shown = nothing_shown() | desk.parts | {"you": {"seat": False, "free": False, "pages": 1}}
         if desk.state != "over":
-            shown |= {"ended": self.room.closed_text(page.number)}
+            asks_nobody = {"lesson": desk.parts["lesson"] | {"asks": False}} if desk.parts.get("lesson") else {}
+            shown |= asks_nobody | {"question": None, "ended": self.room.closed_text(page.number)}
         await page.send(json.dumps({"seat": shown}))
         with suppress(WebSocketDisconnect):
             while True:

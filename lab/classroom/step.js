@@ -40,7 +40,6 @@ function show(state) {
   el("go").hidden = !(state.kind in LABELS);
   el("go").textContent = LABELS[state.kind] || "";
   el("decline").hidden = state.kind !== "consent";
-  el("withdraw").hidden = !state.participant;
   sure(Boolean(leaves));
   window.scrollTo(0, 0);
 }
@@ -48,6 +47,7 @@ function show(state) {
 function sure(wanted) {
   el("sure").hidden = !wanted;
   el("step").hidden = wanted;
+  el("withdraw").hidden = wanted || !shown.participant;
   if (wanted) el("withdraw-no").focus();
 }
 

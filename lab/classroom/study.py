@@ -72,8 +72,11 @@ class Study:
         return study
 
     def _checked(self, person: Participant) -> Participant:
-        arms = [arm.name for arm in self.protocol.arms]
-        planned = self.protocol.steps(person.order) if {*person.order} <= {*arms} else []
+        arms = sorted(arm.name for arm in self.protocol.arms)
+        fits = sorted(person.order) == arms or (
+            self.protocol.order == "between" and person.order in [[arm] for arm in arms]
+        )
+        planned = self.protocol.steps(person.order) if fits else []
         if [step.plan for step in person.steps] != planned[: len(person.steps)] or not person.steps:
             raise BadInput(
                 f"participant {person.participant} of '{self.roster.folder}' (--resume): the steps are not the protocol's"

@@ -355,7 +355,7 @@ class StudyRoom(Room):
                 continue
             step = person.step
             if step is None or step.kind != "lesson" or step.ended is not None:
-                tile["state"], tile["asks"] = "idle", ""
+                tile |= {"state": "idle", "text": _doing(step), "asks": ""}
             tile["here"] |= now_s - self._seen_s.get(number, -HERE_S) < HERE_S
             tile["study"] = {
                 "step": len(person.steps),

@@ -12,6 +12,7 @@ from lab.classroom.roster import FILE, Roster
 from lab.teaching.lesson_options import LessonOptions
 
 Lab = Callable[..., Any]
+EXAMPLE = Path(__file__).parents[2] / "examples" / "study_with_people.toml"
 
 
 @pytest.mark.parametrize(
@@ -36,6 +37,13 @@ Lab = Callable[..., Any]
         (["world-1", "--out", "x", "--lan", "127.0.0.1", "--certificate", "c.pem"], "--key"),
         (["world-1", "--out", "x", "--lan", "127.0.0.1", "--certificate", "c.pem", "--key", "k.pem"], "c.pem"),
         (["world-1", "--out", "x", "--lan", "192.0.2.1"], "192.0.2.1"),
+        (["--study", "s.toml", "--out", "x"], "s.toml"),
+        (["--study", str(EXAMPLE)], "--out"),
+        (["--study", str(EXAMPLE), "--out", "x", "--typed-names"], "--typed-names"),
+        (["--study", str(EXAMPLE), "--out", "x", "--gate", "ia"], "--gate"),
+        (["--study", str(EXAMPLE), "--out", "x", "--seed", "3"], "--seed"),
+        (["world-1", "--study", str(EXAMPLE), "--out", "x"], "LESSON"),
+        (["--study", str(EXAMPLE), "--resume", "y"], "--resume y"),
     ],
 )
 def test_what_is_refused(
