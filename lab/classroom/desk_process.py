@@ -14,6 +14,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
+from lab.advice.answer_times import AnswerTimes
 from lab.advice.entries import FILE
 from lab.errors import LabError
 from lab.files import is_file
@@ -39,7 +40,7 @@ class DeskOrder:
     """What is taught at a desk: the lesson's options, the folder of its session, and the pupil's own toolbox.
 
     files: the members from files that the teacher has named, see `lab.plugins.code_file.files_taken`; modules: those that the
-    teacher has named, so that a session that goes on may import them.
+    teacher has named, so that a session that goes on may import them; times: whether the times of the pupil's answers are kept.
     """
 
     options: LessonOptions
@@ -47,6 +48,7 @@ class DeskOrder:
     toolbox: Path
     files: Mapping[str, tuple[str, str]] = field(default_factory=files_taken)
     modules: tuple[str, ...] = ()
+    times: bool = False
 
 
 def sit(order: DeskOrder, pipe: Connection) -> None:
@@ -92,7 +94,8 @@ def _lesson(order: DeskOrder, page: SeatPage) -> Mapping[str, Any]:
     else:
         check_new(order.folder)
     options = order.options if kept is None else kept.options
-    seat = LessonSeat(RunProgress(EscapingConsole(quiet=True)), None, page)
+    times = AnswerTimes() if order.times else None
+    seat = LessonSeat(RunProgress(EscapingConsole(quiet=True)), None, page, times=times)
     try:
         subject = subject_of(options, kept)
         teacher = Teacher(Toolbox(str(order.toolbox)), options.advising(seat.people()), options.seed, seat.hear)
@@ -100,6 +103,8 @@ def _lesson(order: DeskOrder, page: SeatPage) -> Mapping[str, Any]:
         seat.lesson_over(document)
     finally:
         seat.clear_scene()
+        if times is not None:
+            times.close()
     return document
 
 

@@ -18,6 +18,7 @@ from lab.errors import BadInput, LabError
 from lab.files import is_file, json_of, read_limited, write_whole
 
 Json = dict[str, Any]
+PROTOCOL = "protocol.toml"  # in the folder of a study, whose times are always kept
 KEPT = "lesson.json"  # beside the journal of a finished lesson: its document, and the last state of its page
 MOST_BYTES = 1 << 24
 MOST_HINT = 200  # characters
@@ -83,7 +84,8 @@ class Room:
         """Open the desk of a pupil at the pupil's lesson: the lesson begins, goes on, or is shown if it is over."""
         options = replace(self.roster.lessons[pupil.lesson], seed=self.roster.seed)
         folder, toolbox = self.folder(pupil, pupil.lesson), self.roster.folder / pupil.folder / "toolbox"
-        order = DeskOrder(options, folder, toolbox, modules=self.roster.modules)
+        times = self.roster.times or is_file(self.roster.folder / PROTOCOL)
+        order = DeskOrder(options, folder, toolbox, modules=self.roster.modules, times=times)
         before = self.desks.get(pupil.number)
         desk = self.desks[pupil.number] = Desk(order)
         desk.on_news = lambda: self._stirred(pupil.number, desk)

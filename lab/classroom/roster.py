@@ -66,6 +66,7 @@ class _Kept:
     typed_names: bool
     port: Annotated[int, Ge(0), Le(65535)]
     pupils: list[Pupil]
+    times: bool = False
 
 
 class Full(Exception):
@@ -77,7 +78,8 @@ class Roster:
     """The lessons and pupils of a class; every change is written to `folder` at once.
 
     code: what pupils type to join; port: of the last server, so that pupils' pages find the next one; typed_names: whether
-    pupils choose their names; modules: those that the teacher has named for lessons such as gym:MODULE:ID, which is not kept.
+    pupils choose their names; modules: those that the teacher has named for lessons such as gym:MODULE:ID, which is not kept;
+    times: whether the times of pupils' answers are kept beside their journals.
     """
 
     folder: Path
@@ -89,6 +91,7 @@ class Roster:
     port: int = 0
     pupils: list[Pupil] = field(default_factory=list)
     modules: tuple[str, ...] = ()
+    times: bool = False
 
     @classmethod
     def new(cls, folder: Path, lessons: Sequence[LessonOptions], seed: int, most: int, typed_names: bool) -> "Roster":
@@ -126,13 +129,17 @@ class Roster:
         for number, pupil in enumerate(kept.pupils, start=1):
             if pupil.number != number or clean_name(pupil.name) != pupil.name or not 0 <= pupil.lesson < len(lessons):
                 raise BadInput(f"{where}: pupil {number} is {asdict(pupil)}: a file of lab class is wanted")
-        return cls(folder, kept.code, lessons, kept.seed, kept.most, kept.typed_names, kept.port, kept.pupils)
+        return cls(
+            folder, kept.code, lessons, kept.seed, kept.most, kept.typed_names, kept.port, kept.pupils, times=kept.times
+        )
 
     def write(self) -> None:
         """Write the roster, whose folder is made if it is missing. Raises OSError."""
         self.folder.mkdir(parents=True, exist_ok=True)
         lessons = [options.to_json() for options in self.lessons]
-        kept = _Kept(FORMAT, self.code, lessons, self.seed, self.most, self.typed_names, self.port, self.pupils)
+        kept = _Kept(
+            FORMAT, self.code, lessons, self.seed, self.most, self.typed_names, self.port, self.pupils, self.times
+        )
         write_whole(self.folder / FILE, (json.dumps(asdict(kept), indent=1) + "\n").encode())
 
     # ---- pupils

@@ -6,6 +6,7 @@ from lab.lazy import loader
 
 if TYPE_CHECKING:
     from lab.advice.advisors import ADVISORS, MODEL, AdvisorName, split_praise
+    from lab.advice.answer_times import AnswerTimes
     from lab.advice.entries import Read, read_journal
     from lab.advice.panel import ASKED, DECISIONS
     from lab.api.scenes import SceneRequest as SceneAsked
@@ -142,6 +143,7 @@ if TYPE_CHECKING:
 
 TABLE = {
     "lab.advice.advisors": ("AdvisorName", "ADVISORS", "MODEL", "split_praise"),
+    "lab.advice.answer_times": ("AnswerTimes",),
     "lab.advice.entries": ("Read", "read_journal"),
     "lab.advice.panel": ("ASKED", "DECISIONS"),
     "lab.api.scenes": ("SceneRequest as SceneAsked", "seen"),

@@ -14,9 +14,18 @@ from lab.files import is_file
 
 @contextmanager
 def lesson_seat(
-    names: Sequence[str], *, page: bool = False, port: int = 0, wait_s: float | None = None, plain: bool = False
+    names: Sequence[str],
+    *,
+    page: bool = False,
+    port: int = 0,
+    wait_s: float | None = None,
+    plain: bool = False,
+    times: bool = False,
 ) -> Iterator["deferred.LessonSeat"]:
-    """The seat of a command's lessons: the progress lines, and on request the prompt, the page and language models."""
+    """The seat of a command's lessons: the progress lines, and on request the prompt, the page and language models.
+
+    times: whether the times of people's answers are kept beside their journals.
+    """
     names = [deferred.split_praise(name)[0] for name in names]
     progress, asked = deferred.RunProgress(console()), [name for name in names if name.startswith(deferred.MODEL)]
     models = deferred.language_models(asked) if asked else {}
@@ -28,7 +37,10 @@ def lesson_seat(
             if not {"web", "terminal"} & {*names}:
                 shown.asks_nobody()
         prompt = deferred.TeachingPrompt(progress.console, plain=plain) if "terminal" in names else None
-        seat = deferred.LessonSeat(progress, prompt, shown, models)
+        kept = deferred.AnswerTimes() if times else None
+        if kept is not None:
+            stack.callback(kept.close)
+        seat = deferred.LessonSeat(progress, prompt, shown, models, kept)
         stack.callback(seat.clear_scene)
         try:
             yield seat
