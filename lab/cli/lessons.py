@@ -111,6 +111,8 @@ def say_read(kept: "deferred.KeptSession | deferred.OrderSession", where: str) -
     assert kept.read is not None
     if kept.read.cut:
         _say_cut(kept.read)
+    for line in kept.notes:
+        complain(f"session '{kept.read.path.parent}': {line}")
     options = kept.options
     named: list[object] = [getattr(options, "subtask", None), options.task]
     if str(named[0]).startswith("gym:"):
