@@ -124,7 +124,7 @@ def test_stopped_in_its_first_episode_it_has_an_order_and_goes_on_too(lab: Lab) 
 
 def test_it_is_shown_again_without_its_file(lab: Lab, tmp_path: Path) -> None:
     cell = tmp_path / "mine.toml"
-    cell.write_text((tasks_folder() / "two-toasters.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    cell.write_text((tasks_folder() / "toast-case-1.toml").read_text(encoding="utf-8"), encoding="utf-8")
     words = f"{cell} --toasts 2 --method srl --advisor terminal --gate always --episodes 2"
     folder = advised(lab, "1", "2", "auto", words=words).json["session"]
     before = lab("replay", folder, "--json")
