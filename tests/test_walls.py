@@ -48,7 +48,9 @@ ALONE: dict[str, set[str]] = (
         "websockets": {"lab.classroom.class_server", "lab.classroom.desk"},
         "segno": {"lab.classroom.code_picture"},
         "cryptography": {"lab.classroom.certificate"},
-        "jinja2": {"lab.studies.report"},
+        "jinja2": {"lab.studies.report", "lab.studies.people_report"},
+        "pyarrow": {"lab.classroom.export"},
+        "statsmodels": {"lab.studies.people"},
         "lark": {"lab.words.slots"},
         "fsspec": {"lab.toolbox.remote_place"},
         "s3fs": set(),  # fsspec's
@@ -83,6 +85,7 @@ READS_ITS_OWN = (  # what ships with the lab, or what it has just written: nothi
         "lab.view.meshcat",
         "lab.view.server_page",
         "lab.studies.report",
+        "lab.studies.people_report",
         "lab.cli.export",
         "lab.toolbox.remote_place",
     ),

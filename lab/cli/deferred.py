@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from lab.audit.audit import audit, kept_evidence
     from lab.classroom.class_server import ClassServer
     from lab.classroom.code_picture import code_text
+    from lab.classroom.export import export, exported
     from lab.classroom.holding import attend, begun_words, closing, place_of
     from lab.classroom.roster import ADVISORS as PUPILS
     from lab.classroom.roster import Roster
@@ -72,6 +73,7 @@ if TYPE_CHECKING:
     from lab.studies import STUDIES, Study, carried_out, run_study, study_of
     from lab.studies.compared import Compared, compared
     from lab.studies.leaderboard import draw_board, leaderboard
+    from lab.studies.people_report import people_compared
     from lab.studies.runner import Job
     from lab.studies.tuning import FILE, Tuning, tuned
     from lab.tasks.cell_file import CellFile, toml_of
@@ -150,6 +152,7 @@ TABLE = {
     "lab.audit.audit": ("audit", "kept_evidence"),
     "lab.classroom.class_server": ("ClassServer",),
     "lab.classroom.code_picture": ("code_text",),
+    "lab.classroom.export": ("export", "exported"),
     "lab.classroom.holding": ("attend", "begun_words", "closing", "place_of"),
     "lab.classroom.roster": ("ADVISORS as PUPILS", "Roster"),
     "lab.export": ("FORMATS",),
@@ -204,6 +207,7 @@ TABLE = {
     "lab.studies": ("carried_out", "run_study", "STUDIES", "Study", "study_of"),
     "lab.studies.compared": ("Compared", "compared"),
     "lab.studies.leaderboard": ("draw_board", "leaderboard"),
+    "lab.studies.people_report": ("people_compared",),
     "lab.studies.runner": ("Job",),
     "lab.studies.tuning": ("FILE", "tuned", "Tuning"),
     "lab.tasks.cell_file": ("CellFile", "toml_of"),
