@@ -140,7 +140,10 @@ class Roster:
         kept = _Kept(
             FORMAT, self.code, lessons, self.seed, self.most, self.typed_names, self.port, self.pupils, self.times
         )
-        write_whole(self.folder / FILE, (json.dumps(asdict(kept), indent=1) + "\n").encode())
+        record = {
+            name: value for name, value in asdict(kept).items() if name != "times" or value
+        }  # older files lack it
+        write_whole(self.folder / FILE, (json.dumps(record, indent=1) + "\n").encode())
 
     # ---- pupils
 

@@ -5,7 +5,7 @@ arms, and the tests are of paired values; otherwise each was in one.
 """
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 from statistics import mean, median
@@ -189,6 +189,8 @@ def _described(values: Mapping[str, float], everybody: int) -> ArmValues:
     numbers = [*values.values()]
     middle, low, high = interval(numbers) if len(numbers) > 1 else (numbers[0] if numbers else None, None, None)
     ends = None if low is None or high is None else (low, high)
+    if ends is not None and {*numbers} <= {0.0, 1.0}:
+        ends = max(0.0, ends[0]), min(1.0, ends[1])
     return ArmValues(len(numbers), everybody - len(numbers), middle, ends, median(numbers) if numbers else None)
 
 
@@ -226,6 +228,7 @@ def _pair(
     values: Mapping[str, Mapping[str, float]], first: str, second: str, within: bool, rng: np.random.Generator
 ) -> PairCompared:
     one, other = values[first], values[second]
+    statistics: tuple[Callable[..., Any], ...]
     if within:
         table = _complete({first: one, second: other})
         samples: tuple[FloatArray, ...] = (table[:, 1] - table[:, 0],)
@@ -235,7 +238,8 @@ def _pair(
         n, statistics = min(map(len, samples)), (_difference, correlation)
     if n < LEAST:
         return PairCompared(first, second, n, None, None, None, None, None)
-    (difference, ends), (related, related_ends) = (_bootstrapped(samples, statistic, rng) for statistic in statistics)
+    difference, ends = _bootstrapped(samples, statistics[0], rng)
+    related, related_ends = _bootstrapped(samples, statistics[1], rng)
     return PairCompared(first, second, n, difference, ends, related, related_ends, _p(samples))
 
 
@@ -345,10 +349,14 @@ def _notes(compared: Sequence[MeasureCompared], within: bool, people: int) -> It
     """What a reader has to know of the numbers."""
     if within:
         yield (
-            "Within participants: Friedman's test of those who have a value in every arm, Wilcoxon's signed-rank test of each "
-            "pair of arms, and a linear mixed-effects model with a random intercept for each participant and the place in the "
-            "order."
+            "Within participants: Friedman's test of those who have a value in every arm, and Wilcoxon's signed-rank test of "
+            "each pair of arms."
         )
+        if any(measure.model is not None for measure in compared):
+            yield (
+                "The mixed-effects model is linear, with a random intercept for each participant; its terms are the arms and the "
+                "place in the participant's order."
+            )
         if people < 6:
             least = 2 / 2**people
             yield f"Only {counted(people, 'participant')}: Wilcoxon's p cannot be below {least:.2g}, whatever the values are."

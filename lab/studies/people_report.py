@@ -145,11 +145,13 @@ def _shown(measure: MeasureCompared, picture: bytes) -> Json:
             {"caption": f"Mixed-effects model{unit}", "head": ["term", "estimate", "95 %", "p"], "lines": lines}
         )
         note = (
-            f"All arms alike: p = {_p(model.p)}. Standard deviation between participants {_number(model.between_sd)}, "
+            f"All arms alike: p {_p(model.p, '= ')}. Standard deviation between participants {_number(model.between_sd)}, "
             f"of the rest {_number(model.within_sd)}{unit}.{f' The model: {model.note}.' if model.note else ''}"
         )
     effect = "Kendall's W" if measure.test == "Friedman" else "epsilon squared"
-    all_arms = f"{measure.test}: {_number(measure.statistic)}, p = {_p(measure.p)}, {effect} {_number(measure.effect)}."
+    all_arms = (
+        f"{measure.test}: {_number(measure.statistic)}, p {_p(measure.p, '= ')}, {effect} {_number(measure.effect)}."
+    )
     return {
         "title": measure.title,
         "figure": f"data:image/svg+xml;base64,{b64encode(picture).decode()}",
@@ -168,5 +170,5 @@ def _range(ends: tuple[float, float] | None) -> str:
     return NOTHING if ends is None else f"{_number(ends[0])} to {_number(ends[1])}"
 
 
-def _p(value: float | None) -> str:
-    return NOTHING if value is None else "< 0.001" if value < 0.001 else f"{value:.3f}"
+def _p(value: float | None, equals: str = "") -> str:
+    return NOTHING if value is None else "< 0.001" if value < 0.001 else f"{equals}{value:.3f}"

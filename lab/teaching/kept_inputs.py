@@ -215,12 +215,12 @@ def read_inputs(folder: Path) -> KeptInputs | None:
         raise BadInput(f"'{path}': {at}: {why['msg']}: a file of a session's folder is wanted") from None
 
 
-def replaced(folder: Path, kept: KeptInputs, named: Mapping[str, str]) -> tuple[dict[str, str], list[str]]:
+def replaced(folder: Path, kept: KeptInputs, named: Mapping[str, str]) -> tuple[dict[str, Any], list[str]]:
     """(the copies by option, a line for each) for the options whose file is gone or is not the one that was learned on.
 
     named: as in `keep_inputs`. Raises BadInput for a copy that is missing, was changed, or lies outside the folder.
     """
-    paths, lines = dict[str, str](), list[str]()
+    paths, lines = dict[str, Any](), list[str]()
     for option, copied in kept.inputs.items():
         word = named.get(option)
         if word is None:

@@ -1,10 +1,11 @@
 """A problem as a safetensors file, from which a session can be replayed where the code that made it is not there."""
 
 import json
+from typing import Any
 
 import numpy as np
-from safetensors import SafetensorError, deserialize
-from safetensors.numpy import save
+from safetensors import SafetensorError
+from safetensors.numpy import load, save
 
 from lab.errors import BadInput
 from lab.files import json_of
@@ -13,12 +14,7 @@ from lab.mdp import TabularMDP
 
 FORMAT = "teaching-lab-problem-1"
 MOST_BYTES = 32 << 20
-_TABLES = {
-    "successor": ("I32", np.int32),
-    "reward": ("F64", np.float64),
-    "terminal": ("U8", np.uint8),
-    "goal": ("U8", np.uint8),
-}
+_TABLES = {"successor": np.int32, "reward": np.float64, "terminal": np.uint8, "goal": np.uint8}
 _WORDS = ("name", "subtask", "start", "starts", "action_labels", "shape", "coverage_shape")
 
 
@@ -29,7 +25,7 @@ def encode(problem: Problem) -> bytes | None:
         return None
     if 13 * mdp.n_states * mdp.n_actions > MOST_BYTES:
         return None
-    tables = {name: np.ascontiguousarray(getattr(mdp, name), kind) for name, (_, kind) in _TABLES.items()}
+    tables = {name: np.ascontiguousarray(getattr(mdp, name), kind) for name, kind in _TABLES.items()}
     words = {name: getattr(problem if name in ("name", "subtask") else mdp, name) for name in _WORDS}
     metadata = {name: json.dumps(value, default=int) for name, value in words.items()}
     return bytes(save(tables, {"format": FORMAT} | metadata))
@@ -42,15 +38,16 @@ def decode(content: bytes, where: str) -> Problem:
         words = json_of(content[8 : 8 + length])["__metadata__"]
         if words["format"] != FORMAT:
             raise ValueError(f"format {words['format']!r}, allowed '{FORMAT}'")
-        held = {name: json_of(words[name]) for name in _WORDS}
-        tables = {}
-        for name, table in deserialize(content):
-            if name not in _TABLES or table["dtype"] != _TABLES[name][0]:
-                raise ValueError(f"it holds '{name}' of type {table['dtype']}")
-            tables[name] = np.frombuffer(table["data"], _TABLES[name][1]).reshape(table["shape"])
+        held: dict[str, Any] = {name: json_of(words[name]) for name in _WORDS}
+        tables: dict[str, Any] = load(content)
+        for name, table in tables.items():
+            if name not in _TABLES or table.dtype != _TABLES[name]:
+                raise ValueError(f"it holds '{name}' of type {table.dtype}")
         if not all(isinstance(held[name], str) for name in ("name", "subtask")):
             raise ValueError("its name is no text")
-        axes = {name: tuple(held[name]) for name in ("starts", "action_labels", "shape", "coverage_shape")}
+        axes: dict[str, Any] = {
+            name: tuple(held[name]) for name in ("starts", "action_labels", "shape", "coverage_shape")
+        }
         return Problem(held["name"], held["subtask"], TabularMDP(**tables, start=held["start"], **axes))
     except (BadInput, SafetensorError, ValueError, TypeError, KeyError, OverflowError, MemoryError) as error:
         raise BadInput(f"{where}: {' '.join(str(error).split())[:160] or type(error).__name__}") from None
