@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from lab.advice.advisors import PAGE_OF
+from lab.advice.answer_times import AnswerTimes
 from lab.advice.entries import FILE, is_unbegun
 from lab.classroom.class_lesson import ClassLesson
 from lab.classroom.order_lesson import order_lesson
@@ -46,7 +47,7 @@ class DeskOrder:
     people: the names of the pupils who teach together, with a page each; () for one alone. In a session that goes on, they are
     those with whom it began.
     files: the members from files that the teacher has named, see `lab.plugins.code_file.files_taken`; modules: those that the
-    teacher has named, so that a session that goes on may import them.
+    teacher has named, so that a session that goes on may import them; times: whether the times of the pupil's answers are kept.
     """
 
     options: ClassLesson
@@ -55,6 +56,7 @@ class DeskOrder:
     files: Mapping[str, tuple[str, str]] = field(default_factory=files_taken)
     modules: tuple[str, ...] = ()
     people: tuple[str, ...] = ()
+    times: bool = False
 
 
 def sit(order: DeskOrder, pipe: Connection) -> None:
@@ -110,7 +112,10 @@ def _lesson(order: DeskOrder, pages: Mapping[str, SeatPage]) -> Mapping[str, Any
         team = (
             stack.enter_context(Team({PAGE_OF + name: page for name, page in pages.items()})) if order.people else None
         )
-        seat = LessonSeat(RunProgress(EscapingConsole(quiet=True)), None, pages.get(""), team=team)
+        times = AnswerTimes() if order.times else None
+        if times is not None:
+            stack.callback(times.close)
+        seat = LessonSeat(RunProgress(EscapingConsole(quiet=True)), None, pages.get(""), team=team, times=times)
         stack.callback(seat.clear_scene)
         toolbox = Toolbox(str(order.toolbox))
         if isinstance(order.options, OrderSessionOptions):

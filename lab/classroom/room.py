@@ -101,7 +101,9 @@ class Room:
     def order(self, learner: Pupil) -> DeskOrder:
         """What is taught at the desk of one of the roster's `learners`."""
         folder, toolbox = self.folder(learner, learner.lesson), self.toolbox(learner)
-        return DeskOrder(self.roster.lessons[learner.lesson], folder, toolbox, modules=self.roster.modules)
+        times = self.roster.times or self.roster.study is not None
+        lesson = self.roster.lessons[learner.lesson]
+        return DeskOrder(lesson, folder, toolbox, modules=self.roster.modules, times=times)
 
     def _place(self, desk: Desk, before: Desk | None, opens: bool) -> None:
         """Put a desk in the place of another one; opens: whether a lesson that is not over gets a process."""

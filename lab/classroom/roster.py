@@ -21,6 +21,7 @@ from lab.errors import BadInput
 from lab.files import is_file, read_limited, write_whole
 
 FILE = "class.json"
+LATER = ("study", "teams", "times")  # fields that older files lack, and that are written only where they say something
 FORMAT: Final = "teaching-lab class 1"
 MOST_BYTES = 1 << 22
 MOST_PUPILS = 60
@@ -95,6 +96,7 @@ class _Kept:
     pupils: list[Pupil]
     study: StudyEntry | None = None
     teams: Annotated[int, Ge(0), Le(MOST_TEAMS)] = 0
+    times: bool = False
 
 
 class Full(Exception):
@@ -107,7 +109,8 @@ class Roster:
 
     code: what pupils type to join; port: of the last server, so that pupils' pages find the next one; typed_names: whether
     pupils choose their names; modules: those that the teacher has named for lessons such as gym:MODULE:ID, which is not kept;
-    study: of a class that is a study; teams: in how many teams the pupils teach, 0 if each teaches alone.
+    study: of a class that is a study; teams: in how many teams the pupils teach, 0 if each teaches alone; times: whether the
+    times of pupils' answers are kept beside their journals.
     """
 
     folder: Path
@@ -121,6 +124,7 @@ class Roster:
     modules: tuple[str, ...] = ()
     study: StudyEntry | None = None
     teams: int = 0
+    times: bool = False
 
     @classmethod
     def new(cls, folder: Path, lessons: Sequence[ClassLesson], seed: int, most: int, typed_names: bool) -> "Roster":
@@ -166,7 +170,7 @@ class Roster:
             if not (is_named and (is_placed or pupil.is_gone)):
                 raise BadInput(f"{where}: pupil {number} is {asdict(pupil)}: a file of lab class is wanted")
         read = cls(folder, kept.code, lessons, kept.seed, kept.most, kept.typed_names, kept.port, kept.pupils)
-        read.study, read.teams = kept.study, kept.teams
+        read.study, read.teams, read.times = kept.study, kept.teams, kept.times
         return read
 
     def write(self) -> None:
@@ -175,9 +179,9 @@ class Roster:
         lessons = [lesson_to_json(lesson) for lesson in self.lessons]
         kept = _Kept(
             *(FORMAT, self.code, lessons, self.seed, self.most, self.typed_names, self.port, self.pupils),
-            *(self.study, self.teams),
+            *(self.study, self.teams, self.times),
         )
-        record = {name: value for name, value in asdict(kept).items() if name != "study" or value is not None}
+        record = {name: value for name, value in asdict(kept).items() if name not in LATER or value}
         write_whole(self.folder / FILE, (json.dumps(record, indent=1) + "\n").encode())
 
     # ---- pupils

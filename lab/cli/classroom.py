@@ -7,7 +7,7 @@ import typer
 
 from lab.cli import deferred
 from lab.cli.families import from_files, offers
-from lab.cli.options import GateName, Json, LearnerName, Own, Port, Seed, TrustModule
+from lab.cli.options import GateName, Json, LearnerName, Own, Port, Seed, Times, TrustModule
 from lab.cli.output import console, show
 from lab.errors import BadInput, counted
 from lab.lazy import rich
@@ -81,6 +81,7 @@ def hold_class(
         Path | None, typer.Option("--certificate", help="Certificate (PEM); default: made on the spot.")
     ] = None,
     key: Annotated[Path | None, typer.Option("--key", help="The key of the certificate (PEM).")] = None,
+    times: Times = False,
     trust_module: TrustModule = None,
     own: Own = None,
     port: Port = 0,
@@ -127,6 +128,7 @@ def hold_class(
         roster = _new(lessons or [], out, pupils, typed_names, seed, (task, learner, gate, episodes))
         roster.teams = _checked_teams(teams, roster)
         roster.modules = tuple(filter(None, map(deferred.module_of, roster.lessons)))
+    roster.times = roster.times or times
     _check(roster)
     place = deferred.place_of(lan, name or (), certificate, key)
     said = console()

@@ -6,6 +6,7 @@ from lab.lazy import loader
 
 if TYPE_CHECKING:
     from lab.advice.advisors import ADVISORS, MODEL, PAGE_OF, AdvisorName, split_praise
+    from lab.advice.answer_times import AnswerTimes
     from lab.advice.entries import Read, read_journal
     from lab.advice.panel import ASKED, DECISIONS
     from lab.api.scenes import SceneRequest as SceneAsked
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from lab.classroom.class_report import write_report
     from lab.classroom.class_server import ClassServer
     from lab.classroom.code_picture import code_text
+    from lab.classroom.export import export, exported
     from lab.classroom.holding import attend, begun_words, closing, place_of
     from lab.classroom.roster import Roster
     from lab.classroom.study import Study as StudyWithPeople
@@ -76,6 +78,7 @@ if TYPE_CHECKING:
     from lab.studies import STUDIES, Study, carried_out, run_study, study_of
     from lab.studies.compared import Compared, compared
     from lab.studies.leaderboard import draw_board, leaderboard
+    from lab.studies.people_report import people_compared
     from lab.studies.runner import Job
     from lab.studies.tuning import FILE, Tuning, tuned
     from lab.tasks.cell_file import CellFile, toml_of
@@ -147,6 +150,7 @@ if TYPE_CHECKING:
 
 TABLE = {
     "lab.advice.advisors": ("AdvisorName", "ADVISORS", "MODEL", "PAGE_OF", "split_praise"),
+    "lab.advice.answer_times": ("AnswerTimes",),
     "lab.advice.entries": ("Read", "read_journal"),
     "lab.advice.panel": ("ASKED", "DECISIONS"),
     "lab.api.scenes": ("SceneRequest as SceneAsked", "seen"),
@@ -163,6 +167,7 @@ TABLE = {
     "lab.classroom.class_report": ("write_report",),
     "lab.classroom.class_server": ("ClassServer",),
     "lab.classroom.code_picture": ("code_text",),
+    "lab.classroom.export": ("export", "exported"),
     "lab.classroom.holding": ("attend", "begun_words", "closing", "place_of"),
     "lab.classroom.roster": ("Roster",),
     "lab.classroom.study": ("Study as StudyWithPeople",),
@@ -219,6 +224,7 @@ TABLE = {
     "lab.studies": ("carried_out", "run_study", "STUDIES", "Study", "study_of"),
     "lab.studies.compared": ("Compared", "compared"),
     "lab.studies.leaderboard": ("draw_board", "leaderboard"),
+    "lab.studies.people_report": ("people_compared",),
     "lab.studies.runner": ("Job",),
     "lab.studies.tuning": ("FILE", "tuned", "Tuning"),
     "lab.tasks.cell_file": ("CellFile", "toml_of"),

@@ -13,9 +13,18 @@ from lab.files import is_file
 
 @contextmanager
 def lesson_seat(
-    names: Sequence[str], *, page: bool = False, port: int = 0, wait_s: float | None = None, plain: bool = False
+    names: Sequence[str],
+    *,
+    page: bool = False,
+    port: int = 0,
+    wait_s: float | None = None,
+    plain: bool = False,
+    times: bool = False,
 ) -> Iterator["deferred.LessonSeat"]:
-    """The seat of a command's lessons: the progress lines, and on request the prompt, the page and language models."""
+    """The seat of a command's lessons: the progress lines, and on request the prompt, the page and language models.
+
+    times: whether the times of people's answers are kept beside their journals.
+    """
     names = [deferred.split_praise(name)[0] for name in names]
     progress, asked = deferred.RunProgress(console()), [name for name in names if name.startswith(deferred.MODEL)]
     models = deferred.language_models(asked) if asked else {}
@@ -32,7 +41,10 @@ def lesson_seat(
             progress.console.print(f"page of {name.removeprefix(deferred.PAGE_OF)}: {one.url}", soft_wrap=True)
         team = stack.enter_context(deferred.Team(pages)) if pages else None
         prompt = deferred.TeachingPrompt(progress.console, plain=plain) if "terminal" in names else None
-        seat = deferred.LessonSeat(progress, prompt, shown, models, team)
+        kept = deferred.AnswerTimes() if times else None
+        if kept is not None:
+            stack.callback(kept.close)
+        seat = deferred.LessonSeat(progress, prompt, shown, models, team, kept)
         stack.callback(seat.clear_scene)
         try:
             yield seat
@@ -69,6 +81,8 @@ def say_read(kept: "deferred.KeptSession | deferred.OrderSession", where: str) -
     assert kept.read is not None
     if kept.read.cut:
         _say_cut(kept.read)
+    for line in kept.notes:
+        complain(f"session '{kept.read.path.parent}': {line}")
     options = kept.options
     named: list[object] = [getattr(options, "subtask", None), options.task]
     if str(named[0]).startswith("gym:"):

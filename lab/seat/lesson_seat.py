@@ -1,12 +1,13 @@
 """The seat of a lesson: passes its events to progress lines, terminal and page, and its questions to the person there."""
 
 import time
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from lab.advice.answer_times import AnswerTimes
 from lab.advice.entries import Answer, Praise
 from lab.advice.journal import Undo
 from lab.advice.panel import Panel
@@ -19,6 +20,7 @@ from lab.seat.replay_pace import ReplayPace
 from lab.seat.run_progress import RunProgress
 from lab.seat.spoken_answers import SpokenAnswers
 from lab.seat.terminal.prompt import TeachingPrompt
+from lab.seat.timed_answers import TimedAsk
 from lab.teaching.events import AdvisorGathered, Event, LessonBegan, LessonEvent, QuestionAnswered, ScenePrepared
 from lab.teaching.kept_session import known_values, receipt_of
 
@@ -66,7 +68,7 @@ class LessonSeat:
 
     The page also shows the scene, with the robot in the state of the question. `prompt`, `page`: None for a seat without.
     models: the language models that are asked, by the name of the advisor. team: several people with a page each; all pages show
-    the same.
+    the same. times: where the times of people's answers are kept.
     """
 
     def __init__(
@@ -76,6 +78,7 @@ class LessonSeat:
         page: "SeatPage | None",
         models: "Mapping[str, LanguageModel]" = MappingProxyType({}),
         team: "Team | None" = None,
+        times: AnswerTimes | None = None,
     ) -> None:
         self._team = team
         self._pages = (*([] if page is None else [page]), *([] if team is None else team.pages.values()))
@@ -86,6 +89,7 @@ class LessonSeat:
         self._pace: ReplayPace | None = None  # of a replay
         self._asked_here = False  # whether the last question went to somebody here, and was shown
         self._shown_s = 0.0  # when the page last showed a question that goes elsewhere
+        self._times = times
         self._lesson: LessonBegan | None = None
         self._panel: Panel | None = None
         self._values: tuple[object, FloatArray | None] = (None, None)  # a problem and its optimal values
@@ -190,12 +194,17 @@ class LessonSeat:
         """The functions that ask people and language models, by the name of the advisor."""
         people: dict[str, Ask] = {**self.models}
         if self._prompt is not None:
-            people["terminal"] = SpokenAsk(self._ask_terminal, self._prompt.spoken)
+            people["terminal"] = self._timed("terminal", self._ask_terminal, self._prompt, dict)
         if self.page is not None:
-            people["web"] = SpokenAsk(self._ask_page, self.page.spoken)
+            people["web"] = self._timed("web", self._ask_page, self.page, self.page.shown)
         for name, page in {} if self._team is None else self._team.pages.items():
-            people[name] = SpokenAsk(partial(self._ask_team, name), page.spoken)
+            people[name] = self._timed(name, partial(self._ask_team, name), page, page.shown)
         return people
+
+    def _timed(self, by: str, ask: Ask, way: "TeachingPrompt | SeatPage", shown: Callable[[], dict[str, Any]]) -> Ask:
+        """A function that asks a person, and keeps what they say, and on request the times."""
+        spoken = SpokenAsk(ask, way.spoken)
+        return spoken if self._times is None else TimedAsk(by, spoken, self._times, lambda: way.asking, shown)
 
     def _ask_terminal(self, request: Request) -> Reply:
         """The answer from the terminal; a page shows the question as well, and can answer it."""

@@ -11,6 +11,7 @@ import pytest
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosedError, InvalidStatus
 
+from lab.advice.answer_times import read_times
 from lab.classroom.class_place import Place
 from lab.classroom.class_server import ClassServer
 from lab.classroom.room import PupilPage, Room
@@ -342,3 +343,21 @@ def test_a_full_class_says_so(server: ClassServer) -> None:
         join(server)
     status, said = asked(server, "/join", {"code": server.roster.code})
     assert (status, "full" in json.loads(said)["error"]) == (409, True)
+
+
+def test_the_times_of_answers_are_kept_on_request(server: ClassServer) -> None:
+    server.roster.times = True
+
+    async def twice(opened: ClientConnection) -> Json:
+        for _ in range(2):
+            asks = await question(opened)
+            await answer(opened, asks, asks["own"])
+        return await question(opened)
+
+    at_page(server, join(server)["page"], twice)
+    folder = server.roster.folder / server.roster.pupils[0].folder / "lesson-1"
+    times = read_times(folder)
+    lines = [json.loads(line) for line in (folder / "events.jsonl").read_text().splitlines()]
+    assert [lines[number - 1]["kind"] for number in times] == ["answer", "answer"]
+    assert [(time.by, time.means, time.seen["page"]["episodes"]) for time in times.values()] == [("web", "move", 0)] * 2
+    assert all(time.latency_s is not None for time in times.values())

@@ -1,5 +1,6 @@
 """The panel of the teaching page, shared by two threads: the session's, which asks, and the server's, which serves pages."""
 
+import hashlib
 import json
 import threading
 import time
@@ -31,6 +32,7 @@ from lab.view.meshcat import GANTT_SCRIPT
 SLICE_EVERY_S = 0.1  # least time between two messages with a layer's values
 RUN_EVERY_S = 0.1  # least time between two messages with the status of a run
 SLICE_SHARE = 30  # computing a layer's values takes at most one part in so many of the time
+SEEN = ("curve", "standing", "notices", "members", "receipt")  # parts beside the question, of which a hash is kept
 CLOSED = PageAnswer(0, None, "closed")
 LISTEN_S = 0.2  # longest uninterrupted wait, so that Ctrl-C is noticed
 
@@ -142,6 +144,17 @@ class SeatPanel:
         with self.lock:
             self._ended = True
             self.lock.notify_all()
+
+    def shown(self) -> dict[str, Any]:
+        """What is shown beside the question: the length of the curve, the number of notices, and a hash of the parts SEEN."""
+        with self.lock:
+            now = {part: PARTS[part](self.known, 0.0) for part in SEEN}
+        text = plain_json(now).encode()
+        return {
+            "episodes": now["curve"]["count"],
+            "notices": len(now["notices"]),
+            "sha256": hashlib.sha256(text).hexdigest(),
+        }
 
     # ---- called by the server's thread
 

@@ -31,6 +31,7 @@ from lab.seat.replay_pace import ReplayPace
 from lab.seat.request_text import PathAhead
 from lab.seat.spoken_answers import SpokenAnswers
 from lab.seat.spoken_turns import ASKS, SpokenTurns, Turn, counts_at_once
+from lab.seat.timed_answers import Asking
 from lab.sequencing.search import SequenceRequest
 from lab.teaching.events import ORDER, Event, LessonBegan, LessonEvent
 from lab.teaching.lesson_plan import LessonPlan
@@ -57,6 +58,7 @@ class SeatPage(LiveView):
         self._path = PathAhead()
         self.spoken = SpokenAnswers()  # what the person has said in sentences
         self._turns = SpokenTurns(self.spoken, self._tell, self._command)
+        self.asking = Asking()  # how the last question was shown and answered
 
     def close(self) -> None:
         """Stop serving; whoever waits for an answer is told that the page was closed. Safe to call again."""
@@ -71,8 +73,10 @@ class SeatPage(LiveView):
         Raises AdvisorLeft for "auto", after the time limit and when the page is closed, Undo when an answer is taken back,
         and KeyboardInterrupt for "quit".
         """
+        self.asking = Asking(means="rule")
         if self._path.goes_on(request):
             self.look(request)
+            self.asking.means = "path goes on"
             return self._path.step()
         self._drop_path()
         turn = self._turns.before_asking(request)
@@ -103,7 +107,9 @@ class SeatPage(LiveView):
         said: list[Intent] = []
         while True:
             pending = self._pose(request, heard=heard)
+            self.asking.show()
             answer = self._panel.wait(pending)
+            self.asking.answered(*_means(answer))
             if answer is None or not answer.is_spoken:
                 return pending, answer, ASKS
             heard = None
@@ -318,6 +324,10 @@ class SeatPage(LiveView):
         self._show("ended", text)
         self._wake()
 
+    def shown(self) -> Json:
+        """A summary of what else the page shows: see `SeatPanel.shown`."""
+        return {"page": self._panel.shown()}
+
     def _show(self, part: str, value: Any) -> None:
         with self._panel.lock:
             setattr(self._panel.known, part, value)
@@ -326,6 +336,17 @@ class SeatPage(LiveView):
     def _wake(self) -> None:
         if self._server is not None:
             self._server.wake()
+
+
+def _means(answer: PageAnswer | None) -> tuple[str, str]:
+    """By which means an answer was given (see `lab.advice.answer_times.MEANS`), and the sentence that was said."""
+    if answer is None:
+        return "time over", ""
+    if answer.is_spoken:
+        return "sentence", answer.say
+    if answer.word in ("+", "-"):
+        return "praise", ""
+    return answer.word or ("path" if len(answer.path) > 1 else "move"), ""
 
 
 def _said(pending: Pending, answer: PageAnswer | None) -> Reply:
