@@ -4,6 +4,13 @@
 const classBar = (() => {
   const el = (id) => document.getElementById(id);
 
+  // The teacher's own key opens a pupil's desk, perhaps on a projector: it goes out of the address into this window's memory
+  if (new URLSearchParams(location.search).has("pupil")) {
+    sessionStorage.setItem("look", location.search);
+    history.replaceState(null, "", location.pathname);
+  }
+  const search = location.search || sessionStorage.getItem("look") || "";
+
   function show({ name, lesson, lessons, paused, hint, helped }) {
     el("class").hidden = false;
     el("class-name").textContent = name;
@@ -14,5 +21,5 @@ const classBar = (() => {
     el("class-paused").hidden = !paused;
   }
 
-  return { show };
+  return { search, show };
 })();

@@ -20,6 +20,7 @@ from lab.classroom.desk_process import DeskOrder, sit
 Json = dict[str, Any]
 State = Literal["opening", "open", "over", "failed", "stopped", "lost"]
 KEPT = ("lesson", "place", "robot", "question", "curve", "standing", "notices", "members", "receipt", "ended")
+AGAIN_S = 0.5  # after which a lost connection to the desk is made again
 MOST_MESSAGE = 1 << 24  # bytes of the desk's messages
 PRELOADED = ["lab.classroom.desk_process", "lab.skills.prepared_scene", "lab.learning.kernels"]
 
@@ -127,11 +128,13 @@ class Desk:
         self.on_news()
 
     async def _watch(self) -> None:
-        """Take over the parts of the document as they change."""
-        with suppress(OSError, ConnectionClosed):
-            async with await self.page(watches=True) as page:
-                async for message in page:
-                    parts = json.loads(message).get("seat", {})
-                    if new := {part: parts[part] for part in KEPT if part in parts}:
-                        self.parts |= new
-                        self.on_news()
+        """Take over the parts of the document as they change, also after a connection that was lost under load."""
+        while self._address:
+            with suppress(OSError, ConnectionClosed):
+                async with await self.page(watches=True) as page:
+                    async for message in page:
+                        parts = json.loads(message).get("seat", {})
+                        if new := {part: parts[part] for part in KEPT if part in parts}:
+                            self.parts |= new
+                            self.on_news()
+            await asyncio.sleep(AGAIN_S)

@@ -21,8 +21,8 @@ Json = dict[str, Any]
 KEPT = "lesson.json"  # beside the journal of a finished lesson: its document, and the last state of its page
 MOST_BYTES = 1 << 24
 MOST_HINT = 200  # characters
-# codes with which a page is closed: the class has ended; load again; another page of the pupil is open
-OVER, RELOAD, REPLACED = 1001, 4001, 4002
+# codes with which a page is closed: the class has ended; load again; another page of the pupil is open; the seat is taken away
+OVER, RELOAD, REPLACED, REMOVED = 1001, 4001, 4002, 4003
 MOST_LOST = 3  # times that a killed process of one lesson is started again by itself
 AT_ONCE = 2  # desks that are started at the same time
 
@@ -64,7 +64,7 @@ class Room:
 
     def begin(self) -> None:
         """Open the desks of the roster's pupils."""
-        for pupil in self.roster.pupils:
+        for pupil in self.roster.seated:
             self.seat(pupil)
 
     async def end(self) -> None:
@@ -112,7 +112,7 @@ class Room:
 
     def _stirred(self, number: int, desk: Desk) -> None:
         """Something of a desk has changed: keep a finished lesson, note when a question came."""
-        if self.desks[number] is not desk:
+        if self.desks.get(number) is not desk:
             return  # it was closed, and another one is in its place
         question = desk.parts.get("question")
         if not question:
@@ -212,7 +212,7 @@ class Room:
 
         Who is at that lesson already stays there. Raises BadInput for a pupil or lesson that there is not.
         """
-        pupils = [*self.roster.pupils] if number is None else [self._pupil(number)]
+        pupils = self.roster.seated if number is None else [self._pupil(number)]
         for pupil in pupils:
             wanted = pupil.lesson + 1 if lesson is None else lesson
             if number is None and wanted >= len(self.roster.lessons):
@@ -237,9 +237,24 @@ class Room:
         if page := self.pages.get(number):
             self._start(page.close(RELOAD))
 
+    def remove(self, number: int) -> None:
+        """Take a pupil's seat away; somebody else may join instead. Raises BadInput for a pupil that is not there."""
+        self._pupil(number)
+        try:
+            self.roster.remove(number)
+        except OSError as error:
+            raise BadInput(f"pupil {number}: the class cannot be written: {error.strerror}") from None
+        if page := self.pages.pop(number, None):
+            self._start(page.close(REMOVED))
+        self._helped.discard(number)
+        for known in (self._hints, self._asked):
+            known.pop(number, None)
+        self._start(self.desks.pop(number).close())
+        self.on_news()
+
     def _pupil(self, number: int) -> Pupil:
-        if not 1 <= number <= len(self.roster.pupils):
-            raise BadInput(f"pupil {number}: the class has {len(self.roster.pupils)}")
+        if number not in self.desks:
+            raise BadInput(f"pupil {number}: nobody in the class has this number")
         return self.roster.pupils[number - 1]
 
     def _show_all(self, number: int | None = None) -> None:
@@ -260,14 +275,14 @@ class Room:
                 now_s - self._asked[pupil.number][1] if pupil.number in self._asked else None,
             )
             | {"hint": self._hints.get(pupil.number, ""), "helped": pupil.number in self._helped}
-            for pupil in self.roster.pupils
+            for pupil in self.roster.seated
         }
 
     def rows(self) -> list[Json]:
         """The rows of all finished lessons: lesson by lesson, best teacher first."""
         rows: list[Json] = []
         for lesson in range(len(self.roster.lessons)):
-            finished = [(pupil, self._document(pupil, lesson)) for pupil in self.roster.pupils]
+            finished = [(pupil, self._document(pupil, lesson)) for pupil in self.roster.seated]
             rows += best_first([row_of(pupil, lesson, document) for pupil, document in finished if document])
         return rows
 

@@ -24,6 +24,7 @@ FILE = "class.json"
 FORMAT: Final = "teaching-lab class 1"
 MOST_BYTES = 1 << 22
 MOST_PUPILS = 60
+MOST_JOINED = 900  # pupils of a class in all, with removed ones
 NAME_LENGTH = 24
 LETTERS = "23456789abcdefghjkmnpqrstuvwxyz"  # without those that look alike
 CODE_LENGTH = 6
@@ -41,12 +42,16 @@ ANIMALS = (
 
 @dataclass(frozen=True)
 class Pupil:
-    """A pupil: a number from 1 on, a name, the SHA-256 of the key in the pupil's address, and the current lesson's number."""
+    """A pupil: a number from 1 on, a name, the SHA-256 of the key in the pupil's address, and the current lesson's number.
+
+    removed: by the teacher; such a pupil has no key and no seat, and the number is not used again.
+    """
 
     number: int
     name: str
     key_hash: str
     lesson: int = 0
+    removed: bool = False
 
     @property
     def folder(self) -> str:
@@ -130,21 +135,26 @@ class Roster:
 
     def write(self) -> None:
         """Write the roster, whose folder is made if it is missing. Raises OSError."""
-        self.folder.mkdir(parents=True, exist_ok=True)
+        self.folder.mkdir(0o700, parents=True, exist_ok=True)  # other users of this computer neither read nor write it
         lessons = [options.to_json() for options in self.lessons]
         kept = _Kept(FORMAT, self.code, lessons, self.seed, self.most, self.typed_names, self.port, self.pupils)
         write_whole(self.folder / FILE, (json.dumps(asdict(kept), indent=1) + "\n").encode())
 
     # ---- pupils
 
+    @property
+    def seated(self) -> list[Pupil]:
+        """The pupils who were not removed."""
+        return [pupil for pupil in self.pupils if not pupil.removed]
+
     def join(self, code: str, name: str = "") -> tuple[Pupil, str] | None:
         """A new pupil and the key of their address; None for a wrong code. Raises Full.
 
         name: what the pupil typed, which counts only in a class of typed names; a name that is taken gets a number.
         """
-        if not compare_digest(code.strip().lower().encode(), self.code.encode()):
+        if not compare_digest(code.strip().lower().encode("utf-8", "surrogatepass"), self.code.encode()):
             return None
-        if len(self.pupils) >= self.most:
+        if len(self.seated) >= self.most or len(self.pupils) >= MOST_JOINED:
             raise Full(f"This class is full: it has {self.most} seats.")
         wanted = clean_name(name) if self.typed_names else ""
         key = token_urlsafe(16)
@@ -156,7 +166,7 @@ class Roster:
     def of_key(self, key: str) -> Pupil | None:
         """The pupil with this key; None for any other text."""
         hashed = hash_of(key)
-        return next((pupil for pupil in self.pupils if compare_digest(pupil.key_hash, hashed)), None)
+        return next((pupil for pupil in self.seated if compare_digest(pupil.key_hash, hashed)), None)
 
     def move(self, number: int, lesson: int) -> Pupil:
         """The pupil with this number, who goes on with a lesson. Raises BadInput for a wrong number of either."""
@@ -168,6 +178,13 @@ class Roster:
         self.write()
         return moved
 
+    def remove(self, number: int) -> None:
+        """Take a pupil's seat and key, for good; the folder of the pupil's lessons stays. Raises BadInput for a wrong number."""
+        if not 1 <= number <= len(self.pupils):
+            raise BadInput(f"pupil {number}: the class has {len(self.pupils)}")
+        self.pupils[number - 1] = replace(self.pupils[number - 1], key_hash="", removed=True)
+        self.write()
+
     def _pseudonym(self) -> str:
         """A name that depends on the class's seed and the pupil's number alone."""
         rng = np.random.default_rng([self.seed, NAMES])
@@ -176,7 +193,7 @@ class Roster:
         return f"{COLOURS[colour]} {ANIMALS[animal]}"
 
     def _free(self, name: str) -> str:
-        taken = {pupil.name for pupil in self.pupils}
+        taken = {pupil.name for pupil in self.seated}
         others = (f"{name[: NAME_LENGTH - 4]} {number}" for number in range(2, MOST_PUPILS + 2))
         return name if name not in taken else next(other for other in others if other not in taken)
 

@@ -3,23 +3,37 @@
 
 const el = (id) => document.getElementById(id), { make } = classTile;
 const boxes = new Map(), SURE_MS = 3000;
-let socket = null, paused = false, wall = false, sure = 0;
+let socket = null, paused = false, wall = false, open = true, sure = 0;
+
+// Everybody sees the address on a projector: its key goes into this window's memory
+if (location.search) {
+  sessionStorage.setItem("class", location.search);
+  history.replaceState(null, "", location.pathname);
+}
+const key = sessionStorage.getItem("class") || "";
 
 const say = (message) => socket && socket.readyState === WebSocket.OPEN && socket.send(JSON.stringify(message));
+const look = (tile) => window.open(`/desk/${key}&pupil=${tile.number}`, "_blank", "noopener");
 const act = {
+  look,
   help: (tile) => {
     say({ do: "help", pupil: tile.number, on: !tile.helped });
-    if (!tile.helped) window.open(`/desk/${location.search}&pupil=${tile.number}`, "_blank", "noopener");
+    if (!tile.helped) look(tile);
   },
   hint: (tile, text) => say({ do: "hint", pupil: tile.number, text }),
   next: (tile) => say({ do: "next", pupil: tile.number }),
   open: (tile) => say({ do: "open", pupil: tile.number }),
+  remove: (tile) => say({ do: "remove", pupil: tile.number }),
 };
 
 function showClass(now) {
   paused = now.paused;
   el("pause").textContent = paused ? "Go on" : "Pause all";
   el("pause").setAttribute("aria-pressed", String(paused));
+  open = now.open;
+  el("door").textContent = open ? "Close the door" : "Open the door";
+  el("door").setAttribute("aria-pressed", String(!open));
+  el("tried").hidden = !now.tried;
   el("picture").src = now.picture;
   el("address").textContent = now.join.replace(/\?.*/, "");
   el("code").textContent = now.code;
@@ -40,6 +54,18 @@ function showTiles(tiles) {
     }
     classTile.draw(boxes.get(tile.number), tile);
   }
+  count();
+}
+
+function removeTiles(numbers) {
+  for (const number of numbers) {
+    boxes.get(number)?.box.remove();
+    boxes.delete(number);
+  }
+  count();
+}
+
+function count() {
   const here = document.querySelectorAll("#tiles small.here").length;
   el("how").textContent = boxes.size ? `${here} of ${boxes.size} pupils are here` : "Nobody has joined yet.";
 }
@@ -66,14 +92,15 @@ function showRows(rows) {
 }
 
 function follow(pause = 300) {
-  socket = new WebSocket(new URL(`frames${location.search}`, location.href.replace(/^http/, "ws")));
+  socket = new WebSocket(new URL(`frames${key}`, location.href.replace(/^http/, "ws")));
   socket.onopen = () => { pause = 300; };
   socket.onmessage = (event) => {
-    const { class: now, rows, tiles, refusal } = JSON.parse(event.data);
+    const { class: now, rows, tiles, removed, refusal } = JSON.parse(event.data);
     el("told").textContent = refusal || "";
     if (now) showClass(now);
     if (rows) showRows(rows);
     if (tiles) showTiles(tiles);
+    if (removed) removeTiles(removed);
   };
   socket.onclose = () => {
     el("how").textContent = "connection lost: trying again";
@@ -94,5 +121,9 @@ el("end").onclick = () => {
   el("end").textContent = "Once more: end it";
   setTimeout(() => { el("end").textContent = "End the class"; }, SURE_MS);
 };
-el("csv").href = `class.csv${location.search}`;
+el("door").onclick = () => say({ do: "door", open: !open });
+el("csv").onclick = () => { // a link shows its address to whoever sees the screen
+  el("csv").href = `class.csv${key}`;
+  setTimeout(() => { el("csv").href = "#"; });
+};
 follow();
