@@ -6,6 +6,13 @@ const classBar = (() => {
   const TICK_MS = 500;
   let study = null, until = 0;
 
+  // The teacher's own key opens a pupil's desk, perhaps on a projector: it goes out of the address into this window's memory
+  if (new URLSearchParams(location.search).has("pupil")) {
+    sessionStorage.setItem("look", location.search);
+    history.replaceState(null, "", location.pathname);
+  }
+  const search = location.search || sessionStorage.getItem("look") || "";
+
   function show({ name, lesson, lessons, paused, hint, helped, team, fellows, late, study: now }) {
     el("class").hidden = false;
     el("class-name").textContent = name;
@@ -21,7 +28,7 @@ const classBar = (() => {
 
   function showStep(now) {
     if (!now.here) {
-      location.replace(`/step/${location.search}`);
+      location.replace(`/step/${search}`);
       return;
     }
     study = now;
@@ -30,7 +37,7 @@ const classBar = (() => {
     el("class-lesson").textContent = `step ${now.step} of ${now.steps}`;
     el("class-step").hidden = false;
     el("class-go").hidden = !now.over;
-    el("class-withdraw").href = `/step/${location.search}#withdraw`;
+    el("class-withdraw").href = `/step/${search}#withdraw`;
     tick();
   }
 
@@ -43,13 +50,13 @@ const classBar = (() => {
   async function goOn() {
     el("class-go").disabled = true;
     try {
-      await fetch(`/step/do${location.search}`, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ do: "go on", step: study.step }) });
+      await fetch(`/step/do${search}`, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ do: "go on", step: study.step }) });
     } finally {
-      location.replace(`/step/${location.search}`);
+      location.replace(`/step/${search}`);
     }
   }
 
   el("class-go").onclick = goOn;
   setInterval(tick, TICK_MS);
-  return { show };
+  return { search, show };
 })();

@@ -9,6 +9,8 @@ import json
 import secrets
 import ssl
 import threading
+import time
+from asyncio.sslproto import SSLProtocol
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -19,30 +21,30 @@ from starlette.applications import Starlette
 from starlette.middleware import Middleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import HTTPConnection, Request
-from starlette.responses import JSONResponse, PlainTextResponse, Response
+from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 from uvicorn import Server as Uvicorn
 from websockets.exceptions import ConnectionClosed
 
-from lab.classroom.browser_socket import closer, sender
+from lab.classroom.browser_socket import closer, sender, text_of
 from lab.classroom.certificate import fingerprint, made_certificate
 from lab.classroom.class_lesson import title_of
 from lab.classroom.class_place import Place, files_of
 from lab.classroom.class_report import HAND_OUTS, POLICY, REPORT, page_now
 from lab.classroom.code_picture import code_svg
-from lab.classroom.desk import nothing_shown
-from lab.classroom.room import OVER, RELOAD, PupilPage, Room
-from lab.classroom.roster import Full, Roster
+from lab.classroom.desk import Desk, nothing_shown
+from lab.classroom.door import Door, Often
+from lab.classroom.room import OVER, RELOAD, REMOVED, PupilPage, Room
+from lab.classroom.roster import Roster
 from lab.classroom.step_pages import StepPages
 from lab.classroom.study import Study
 from lab.classroom.study_room import StudyRoom
 from lab.classroom.team_room import TeamRoom
 from lab.classroom.tile import COLUMNS
-from lab.classroom.wrong_codes import WrongCodes
 from lab.errors import BadInput, WorkFailed
 from lab.files import csv_of
-from lab.view.server import config_of, listening
+from lab.view.server import answer_of, config_of, listening
 from lab.view.server_page import quiet_when_full
 
 START_S, STOP_S = 10.0, 30.0
@@ -51,7 +53,8 @@ READ_S = 0.005  # least interval between two messages from a page
 TILES_EVERY_S = 0.25
 MOST_TEACHERS = 8  # open pages of the teacher
 MOST_LOOKERS = 64  # pages that look over a shoulder
-MOST_BODY = 2048  # bytes of a request to join
+TLS_BYTES = 1 << 14  # read at once from a connection; asyncio would keep 256 KB for each, also before hands are shaken
+MOST_OPENED, OPENED_S = 20, 10.0  # pages that a pupil may open in so many seconds
 FREE, TAKEN = '"free": true', '"free": false'  # in a message about the seat
 FRAMED_NOWHERE = f"{POLICY}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 
@@ -79,7 +82,8 @@ class ClassServer:
         self._ready = threading.Event()
         self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()), name="class", daemon=True)
         self._teachers: dict[WebSocket, asyncio.Event] = {}
-        self._wrong = WrongCodes()
+        self._door = Door(lambda code, name: self.room.join(code, name))
+        self._opened: dict[int, Often] = {}  # by pupil
         base = f"{place.hosts[0]}:{self.port}"
         self.join_url = f"{place.scheme}://{base}/?code={roster.code}"
         self.teacher_url = f"{place.scheme}://{base}/teacher/?token={self._token}"
@@ -133,7 +137,13 @@ class ClassServer:
         self._loop.set_exception_handler(quiet_when_full)
         self.room = self._made_room()
         self.room.on_news = self._stir
-        server = Uvicorn(config_of(self._application(), **self._secured))
+        config = config_of(self._application(), self._socket, **self._secured)
+        config.load()
+        if config.ssl is not None:
+            SSLProtocol.max_size = TLS_BYTES
+            config.ssl.minimum_version = ssl.TLSVersion.TLSv1_2
+            config.ssl.options |= ssl.OP_NO_RENEGOTIATION
+        server = Uvicorn(config)
         serving = asyncio.create_task(server.serve(sockets=[self._socket]))
         self.room.begin()
         self._ready.set()
@@ -176,7 +186,7 @@ class ClassServer:
         file = files.get(request.path_params.get("name", ""))
         if file is None:
             return PlainTextResponse("There is no such page.\n", 404)
-        return Response(file.content, headers={"Content-Security-Policy": file.policy}, media_type=file.kind)
+        return answer_of(file)
 
     async def _table(self, request: Request) -> Response:
         if not self._is_teacher(request):
@@ -201,32 +211,10 @@ class ClassServer:
         return origin is None or urlsplit(origin)[:2] == (self._place.scheme, asked.headers.get("host", ""))
 
     async def _join(self, request: Request) -> Response:
-        """A new pupil's address, for the right code; an address that tries many codes has to wait."""
+        """A new pupil's address, for the right code."""
         if not self._from_here(request):
             return PlainTextResponse("Another site's page may not join.\n", 403)
-        address = request.client.host if request.client else ""
-        if self._wrong.has_to_wait(address):
-            return JSONResponse({"error": "Too many wrong codes: wait a minute."}, 429)
-        body = b""
-        async for part in request.stream():
-            body += part
-            if len(body) > MOST_BODY:
-                return JSONResponse({"error": "That is no request to join."}, 413)
-        try:
-            said = json.loads(body)
-            code, name = str(said["code"]), str(said.get("name", ""))
-        except (ValueError, RecursionError, TypeError, KeyError, AttributeError):
-            return JSONResponse({"error": "That is no request to join."}, 400)
-        try:
-            joined = self.room.join(code, name)
-        except Full as reason:
-            return JSONResponse({"error": str(reason)}, 409)
-        except OSError as error:
-            return JSONResponse({"error": f"The class cannot be written: {error.strerror}"}, 500)
-        if joined is None:
-            self._wrong.note(address)
-            return JSONResponse({"error": "There is no class with this code: look at the board again."}, 403)
-        return JSONResponse(joined)
+        return await self._door.join(request)
 
     # ---- a pupil's page, and one that looks over a shoulder
 
@@ -238,6 +226,11 @@ class ClassServer:
         if pupil is None:
             await self._look(browser)
             return
+        opened, now_s = self._opened.setdefault(pupil.number, Often(MOST_OPENED, OPENED_S)), time.monotonic()
+        if opened.is_full(now_s):
+            await browser.send_denial_response(PlainTextResponse("This page is opened too often: wait.\n", 429))
+            return
+        opened.happened(now_s)
         await browser.accept()
         page = PupilPage(pupil.number, sender(browser), closer(browser))
         self.room.arrived(page)
@@ -263,12 +256,15 @@ class ClassServer:
 
     async def _pass_on(self, browser: WebSocket, page: PupilPage, sits: bool) -> None:
         """Pass messages between a browser and its desk, until one of them leaves."""
-        desk = self.room.desks[page.number]
+        desk = self.room.desks.get(page.number)
+        if desk is None:
+            await page.close(REMOVED)
+            return
         try:
             upstream = await desk.page(not sits, self.room.name_at(page.number))
         except OSError:
             if desk.is_closed or desk.state in ("idle", "over", "failed", "stopped"):
-                await self._show_last(browser, page)
+                await self._show_last(browser, page, desk)
             else:  # it was killed, and is started again
                 await asyncio.sleep(AGAIN_S)
                 await page.close(RELOAD)
@@ -290,9 +286,8 @@ class ClassServer:
                 await asyncio.gather(down, up, return_exceptions=True)
         await page.close(OVER if self.room.ended.is_set() else RELOAD)
 
-    async def _show_last(self, browser: WebSocket, page: PupilPage) -> None:
+    async def _show_last(self, browser: WebSocket, page: PupilPage, desk: Desk) -> None:
         """Show how a lesson ended whose process is not there any more, until the browser leaves."""
-        desk = self.room.desks[page.number]
         shown = nothing_shown() | desk.parts | {"you": {"seat": False, "free": False, "pages": 1}}
         if desk.state != "over":
             asks_nobody = {"lesson": desk.parts["lesson"] | {"asks": False}} if desk.parts.get("lesson") else {}
@@ -300,7 +295,7 @@ class ClassServer:
         await page.send(json.dumps({"seat": shown}))
         with suppress(WebSocketDisconnect):
             while True:
-                await browser.receive_text()
+                await text_of(browser)
 
     async def _down(self, upstream: Any, page: PupilPage, sits: bool) -> None:
         with suppress(ConnectionClosed):
@@ -314,7 +309,7 @@ class ClassServer:
     async def _up(self, browser: WebSocket, upstream: Any, page: PupilPage, sits: bool) -> None:
         with suppress(WebSocketDisconnect, ConnectionClosed):
             while True:
-                message = await browser.receive_text()
+                message = await text_of(browser)
                 if sits and (refusal := self.room.refusal(page.number)):
                     await page.send(json.dumps({"refusal": refusal}))
                 else:
@@ -333,7 +328,7 @@ class ClassServer:
         try:
             with suppress(WebSocketDisconnect):
                 while True:
-                    await self._do(await browser.receive_text(), browser)
+                    await self._do(await text_of(browser), browser)
                     await asyncio.sleep(READ_S)
         finally:
             telling.cancel()
@@ -372,6 +367,8 @@ class ClassServer:
             "paused": self.room.paused,
             "most": self.roster.most,
             "study": None if self._study is None else self._study.told(),
+            "open": self._door.is_open,
+            "tried": self._door.tried,
         }
 
     async def _do(self, message: str, browser: WebSocket) -> None:
@@ -393,6 +390,11 @@ class ClassServer:
                     room.begin_lessons()
                 case {"do": "open", "pupil": int(number)}:
                     room.open_again(number)
+                case {"do": "remove", "pupil": int(number)}:
+                    room.remove(number)
+                case {"do": "door", "open": bool(is_open)}:
+                    self._door.is_open = is_open
+                    self._stir()
                 case {"do": "end"}:
                     self.ended.set()
                 case _:

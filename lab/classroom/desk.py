@@ -22,6 +22,7 @@ from lab.seat.page.teaching_page import TITLE
 Json = dict[str, Any]
 State = Literal["idle", "opening", "open", "over", "failed", "stopped", "lost"]
 KEPT = ("lesson", "place", "robot", "question", "curve", "standing", "notices", "members", "work", "receipt", "ended")
+AGAIN_S = 0.5  # after which a lost connection to the desk is made again
 MOST_MESSAGE = 1 << 24  # bytes of the desk's messages
 PRELOADED = ["lab.classroom.desk_process", "lab.skills.prepared_scene", "lab.learning.kernels"]
 
@@ -157,21 +158,26 @@ class Desk:
         self.on_news()
 
     async def _watch(self, name: str) -> None:
-        """Take over the parts of a page's document as they change; of all pages but the first, only the question."""
-        kept = KEPT if name == next(iter(self._addresses)) else ("question",)
-        with suppress(OSError, ConnectionClosed):
-            async with await self.page(watches=True, name=name) as page:
-                async for message in page:
-                    parts = json.loads(message).get("seat", {})
-                    if not (new := {part: parts[part] for part in kept if part in parts}):
-                        continue
-                    if "question" in new:
-                        self._pose(name, new["question"])
-                    if kept is KEPT:
-                        self.parts |= new
-                    self.on_news()
+        """Take over the parts of a page's document as they change, also after a connection that was lost under load.
 
-    def _pose(self, name: str, question: Json | None) -> None:
-        self.questions.pop(name, None)
-        if question is not None:
-            self.questions[name] = question
+        Of all pages but the first, only the question is taken over.
+        """
+        kept = KEPT if name == next(iter(self._addresses)) else ("question",)
+        while self._addresses:
+            with suppress(OSError, ConnectionClosed):
+                async with await self.page(watches=True, name=name) as page:
+                    async for message in page:
+                        parts = json.loads(message).get("seat", {})
+                        if new := {part: parts[part] for part in kept if part in parts}:
+                            self._take(name, new, kept is KEPT)
+            await asyncio.sleep(AGAIN_S)
+
+    def _take(self, name: str, new: Json, is_first: bool) -> None:
+        """Take over new parts of somebody's page."""
+        if "question" in new:
+            self.questions.pop(name, None)
+            if new["question"] is not None:
+                self.questions[name] = new["question"]
+        if is_first:
+            self.parts |= new
+        self.on_news()

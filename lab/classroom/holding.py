@@ -55,7 +55,10 @@ def attend(server: ClassServer, tell: Callable[[str], None]) -> None:
     """Wait until the teacher's page ends the class, and tell who has joined and whose lesson is over. Ctrl-C raises."""
     known = dict[int, Json]()
     while not server.ended.is_set():
-        tiles = server.call(server.room.tiles)
+        try:
+            tiles = server.call(server.room.tiles)
+        except TimeoutError:  # the computer is busy, or was asleep
+            continue
         for number, tile in tiles.items():
             before = known.get(number)
             if before is None:

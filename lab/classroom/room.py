@@ -20,8 +20,8 @@ from lab.files import is_file, write_whole
 
 Json = dict[str, Any]
 MOST_HINT = 200  # characters
-# codes with which a page is closed: the class has ended; load again; another page of the pupil is open
-OVER, RELOAD, REPLACED = 1001, 4001, 4002
+# codes with which a page is closed: the class has ended; load again; another page of the pupil is open; the seat is taken away
+OVER, RELOAD, REPLACED, REMOVED = 1001, 4001, 4002, 4003
 MOST_LOST = 3  # times that a killed process of one lesson is started again by itself
 AT_ONCE = 2  # desks that are started at the same time
 
@@ -286,9 +286,28 @@ class Room:
         if (state := self.desks[number].state) in ("idle", "opening", "open", "over"):
             raise BadInput(f"desk {number} is {state}: nothing is to be mended")
 
+    def remove(self, number: int) -> None:
+        """Take a pupil's seat away; somebody else may join instead. Raises BadInput for a pupil that is not there."""
+        self._pupil(number)
+        try:
+            self.roster.remove(number)
+        except OSError as error:
+            raise BadInput(f"pupil {number}: the class cannot be written: {error.strerror}") from None
+        if page := self.pages.pop(number, None):
+            self._start(page.close(REMOVED))
+        self._helped.discard(number)
+        for known in (self._hints, self._asked):
+            known.pop(number, None)
+        self._leave(number)
+        self.on_news()
+
+    def _leave(self, number: int) -> None:
+        """Close the desk of a pupil who was removed."""
+        self._start(self.desks.pop(number).close())
+
     def _pupil(self, number: int) -> Pupil:
-        if not 1 <= number <= len(self.roster.pupils) or self.roster.pupils[number - 1].is_gone:
-            raise BadInput(f"pupil {number}: the class has {len(self.roster.present)}")
+        if number not in self.desks:
+            raise BadInput(f"pupil {number}: nobody in the class has this number")
         return self.roster.pupils[number - 1]
 
     def _show_all(self, number: int | None = None) -> None:

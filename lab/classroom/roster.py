@@ -27,6 +27,7 @@ MOST_BYTES = 1 << 22
 MOST_PUPILS = 60
 MOST_TEAMS = 12
 MOST_PARTICIPANTS = 500  # of a study, who are not all there at once
+MOST_JOINED = 900  # pupils of a class in all, with removed ones
 NAME_LENGTH = 24
 LETTERS = "23456789abcdefghjkmnpqrstuvwxyz"  # without those that look alike
 CODE_LENGTH = 6
@@ -45,7 +46,8 @@ ANIMALS = (
 class Pupil:
     """A pupil: a number from 1 on, a name, the SHA-256 of the key in the pupil's address, and the current lesson's number.
 
-    team: the number of the pupil's team from 1 on, 0 in a class without teams.
+    team: the number of the pupil's team from 1 on, 0 in a class without teams. removed: by the teacher; such a
+    pupil has no key and no seat, and the number is not used again.
 
     A participant who has withdrawn leaves the number alone: name and hash are "", and nobody gets the number again.
     """
@@ -55,11 +57,12 @@ class Pupil:
     key_hash: str
     lesson: int = 0
     team: int = 0
+    removed: bool = False
 
     @property
     def is_gone(self) -> bool:
-        """Whether this is only the number of somebody who has withdrawn."""
-        return not self.name
+        """Whether the pupil was removed, or this is only the number of somebody who has withdrawn."""
+        return self.removed or not self.name
 
     @property
     def folder(self) -> str:
@@ -175,7 +178,7 @@ class Roster:
 
     def write(self) -> None:
         """Write the roster, whose folder is made if it is missing. Raises OSError."""
-        self.folder.mkdir(parents=True, exist_ok=True)
+        self.folder.mkdir(0o700, parents=True, exist_ok=True)  # other users of this computer neither read nor write it
         lessons = [lesson_to_json(lesson) for lesson in self.lessons]
         kept = _Kept(
             *(FORMAT, self.code, lessons, self.seed, self.most, self.typed_names, self.port, self.pupils),
@@ -216,12 +219,12 @@ class Roster:
 
     def check_room(self) -> None:
         """Raises Full unless another pupil may join."""
-        if len(self.present) >= self.most:
+        if len(self.present) >= self.most or len(self.pupils) >= MOST_JOINED:
             raise Full(f"This class is full: it has {self.most} seats.")
 
     @property
     def present(self) -> list[Pupil]:
-        """The pupils, without the numbers of those who have withdrawn."""
+        """The pupils, without those who were removed and the numbers of those who have withdrawn."""
         return [pupil for pupil in self.pupils if not pupil.is_gone]
 
     def members(self, team: int) -> list[Pupil]:
@@ -265,7 +268,7 @@ class Roster:
     def of_key(self, key: str) -> Pupil | None:
         """The pupil with this key; None for any other text."""
         hashed = hash_of(key)
-        return next((pupil for pupil in self.pupils if compare_digest(pupil.key_hash, hashed)), None)
+        return next((pupil for pupil in self.present if compare_digest(pupil.key_hash, hashed)), None)
 
     def move(self, number: int, lesson: int) -> Pupil:
         """The pupil with this number, who goes on with a lesson. Raises BadInput for a wrong number of either."""
@@ -276,6 +279,13 @@ class Roster:
         moved = self.pupils[number - 1] = replace(self.pupils[number - 1], lesson=lesson)
         self.write()
         return moved
+
+    def remove(self, number: int) -> None:
+        """Take a pupil's seat and key, for good; the folder of the pupil's lessons stays. Raises BadInput for a wrong number."""
+        if not 1 <= number <= len(self.pupils):
+            raise BadInput(f"pupil {number}: the class has {len(self.pupils)}")
+        self.pupils[number - 1] = replace(self.pupils[number - 1], key_hash="", removed=True)
+        self.write()
 
     def _pseudonym(self) -> str:
         """A name that depends on the class's seed and the pupil's number alone."""

@@ -5,17 +5,27 @@ const el = (id) => document.getElementById(id), { make } = classTile;
 const boxes = new Map(), SURE_MS = 3000;
 let END = "End the class";
 let study = null; // its title, and what this page may do in it
-let socket = null, paused = false, wall = false, sure = 0;
+let socket = null, paused = false, wall = false, open = true, sure = 0;
+
+// Everybody sees the address on a projector: its key goes into this window's memory
+if (location.search) {
+  sessionStorage.setItem("class", location.search);
+  history.replaceState(null, "", location.pathname);
+}
+const key = sessionStorage.getItem("class") || "";
 
 const say = (message) => socket && socket.readyState === WebSocket.OPEN && socket.send(JSON.stringify(message));
+const look = (tile) => window.open(`/desk/${key}&pupil=${tile.number}`, "_blank", "noopener");
 const act = {
+  look,
   help: (tile) => {
     say({ do: "help", pupil: tile.number, on: !tile.helped });
-    if (!tile.helped) window.open(`/desk/${location.search}&pupil=${tile.number}`, "_blank", "noopener");
+    if (!tile.helped) look(tile);
   },
   hint: (tile, text) => say({ do: "hint", pupil: tile.number, text }),
   next: (tile) => say({ do: "next", pupil: tile.number }),
   open: (tile) => say({ do: "open", pupil: tile.number }),
+  remove: (tile) => say({ do: "remove", pupil: tile.number }),
 };
 
 function showClass(now) {
@@ -29,6 +39,10 @@ function showClass(now) {
     el("to-lesson").hidden = el("all").hidden = true;
     el("end").textContent = END = "End for now";
   }
+  open = now.open;
+  el("door").textContent = open ? "Close the door" : "Open the door";
+  el("door").setAttribute("aria-pressed", String(!open));
+  el("tried").hidden = !now.tried;
   el("picture").src = now.picture;
   el("address").textContent = now.join.replace(/\?.*/, "");
   el("code").textContent = now.code;
@@ -51,8 +65,20 @@ function showTiles(tiles, gone) {
       boxes.set(tile.number, classTile.create(act));
       el("tiles").append(boxes.get(tile.number).box);
     }
-    classTile.draw(boxes.get(tile.number), tile, study ? study.may : ["help", "hint", "next"]);
+    classTile.draw(boxes.get(tile.number), tile, study ? study.may : ["help", "hint", "next", "remove"]);
   }
+  count();
+}
+
+function removeTiles(numbers) {
+  for (const number of numbers) {
+    boxes.get(number)?.box.remove();
+    boxes.delete(number);
+  }
+  count();
+}
+
+function count() {
   const here = document.querySelectorAll("#tiles small.here").length;
   el("how").textContent = boxes.size ? `${here} of ${boxes.size} ${study ? "participants" : "pupils"} are here` : "Nobody has joined yet.";
 }
@@ -81,7 +107,7 @@ function showRows(rows) {
 }
 
 function follow(pause = 300) {
-  socket = new WebSocket(new URL(`frames${location.search}`, location.href.replace(/^http/, "ws")));
+  socket = new WebSocket(new URL(`frames${key}`, location.href.replace(/^http/, "ws")));
   socket.onopen = () => { pause = 300; };
   socket.onmessage = (event) => {
     const { class: now, rows, tiles, teams, gone, refusal } = JSON.parse(event.data);
@@ -111,5 +137,11 @@ el("end").onclick = () => {
   el("end").textContent = "Once more: end it";
   setTimeout(() => { el("end").textContent = END; }, SURE_MS);
 };
-for (const [id, file] of [["csv", "class.csv"], ["paper", "report.html"], ["handed", "hand-outs.html"]]) el(id).href = file + location.search;
+el("door").onclick = () => say({ do: "door", open: !open });
+for (const [id, file] of [["csv", "class.csv"], ["paper", "report.html"], ["handed", "hand-outs.html"]]) {
+  el(id).onclick = () => { // a link shows its address to whoever sees the screen
+    el(id).href = file + key;
+    setTimeout(() => { el(id).href = "#"; });
+  };
+}
 follow();

@@ -2,7 +2,7 @@
 "use strict";
 
 const classTile = (() => {
-  const SVG = "http://www.w3.org/2000/svg", WIDE = 240, HIGH = 64, LONG_S = 60;
+  const SVG = "http://www.w3.org/2000/svg", WIDE = 240, HIGH = 64, LONG_S = 60, SURE_MS = 3000;
   const STATES = { idle: "", opening: "opens", open: "", over: "done", failed: "failed", stopped: "stopped", lost: "its process has ended" };
   const ENDS = { steps: ["did not reach its goal", "reached its goal"], order: ["its order is not proven the best", "found a best order"] };
   const VERDICTS = { rejected: "dropped: its advice misled", converged: "needs no more advice", left: "works alone" };
@@ -55,10 +55,8 @@ const classTile = (() => {
   // An empty tile, whose buttons stay the same while what it says changes; act: what they do, by name
   function create(act) {
     const box = make("article", undefined, "tile"), head = make("h2"), says = make("p", "", "says"), facts = make("p"), hint = make("p", "", "hint"), row = make("p", undefined, "row");
-    const name = make("span"), here = make("small"), look = make("a", "Look"), form = make("form", undefined, "row"), field = make("input");
-    const parts = { box, name, here, says, facts, hint, look, picture: curve({ curve: [], guided: [] }), tile: null };
-    look.target = "_blank";
-    look.title = "over the shoulder, live; while you help you answer there";
+    const name = make("span"), here = make("small"), form = make("form", undefined, "row"), field = make("input");
+    const parts = { box, name, here, says, facts, hint, picture: curve({ curve: [], guided: [] }), tile: null };
     field.maxLength = 200;
     form.hidden = true;
     form.append(field, make("button", "Show"));
@@ -75,10 +73,17 @@ const classTile = (() => {
       field.setAttribute("aria-label", `hint for ${parts.tile.name}`);
       field.focus();
     });
+    const look = button("Look", "over the shoulder, live; while you help you answer there", () => act.look(parts.tile));
+    let sure = 0;
+    const remove = button("Remove", "take this seat away, for good", () => {
+      if (performance.now() < sure) act.remove(parts.tile);
+      sure = performance.now() + SURE_MS;
+      remove.textContent = "Once more: remove";
+      setTimeout(() => { remove.textContent = "Remove"; }, SURE_MS);
+    });
     head.append(name, here);
-    parts.hints = ask;
-    parts.next = button("Next", "to the next lesson", () => act.next(parts.tile));
-    row.append(look, parts.help, ask, parts.next, parts.open);
+    Object.assign(parts, { hints: ask, next: button("Next", "to the next lesson", () => act.next(parts.tile)), remove });
+    row.append(look, parts.help, ask, parts.next, remove, parts.open);
     box.append(head, parts.picture, says, facts, hint, row, form);
     return parts;
   }
@@ -99,8 +104,8 @@ const classTile = (() => {
     parts.help.hidden = !may.includes("help");
     parts.hints.hidden = !may.includes("hint");
     parts.next.hidden = !may.includes("next");
+    parts.remove.hidden = !may.includes("remove");
     parts.hint.textContent = tile.hint ? `Hint: ${tile.hint}` : "";
-    parts.look.href = `/desk/${location.search}&pupil=${tile.number}`;
     parts.help.textContent = tile.helped ? "Give back" : "Help";
     parts.open.hidden = !["failed", "stopped", "lost"].includes(tile.state);
   }

@@ -138,6 +138,14 @@ class TeamRoom(Room):
         self._check_closed(number)
         self._open(pupil.team)
 
+    def _leave(self, number: int) -> None:
+        """A pupil was removed: the team goes on without, and its desk closes with the last of its pupils."""
+        del self.desks[number]
+        team = self.roster.pupils[number - 1].team
+        if not self.roster.members(team):
+            self._start(self._teams.pop(team).close())
+            self._begun.discard(team)
+
     # ---- what the teacher sees
 
     def tiles(self) -> dict[int, Json]:

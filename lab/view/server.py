@@ -6,10 +6,10 @@ delays the run nor lets messages pile up. Messages from a page go to the panel, 
 
 import asyncio
 import secrets
-import socket
 import threading
-from collections.abc import Mapping
+from collections.abc import AsyncIterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -17,7 +17,7 @@ from starlette.applications import Starlette
 from starlette.middleware import Middleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import HTTPConnection, Request
-from starlette.responses import PlainTextResponse, Response
+from starlette.responses import PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket
@@ -31,6 +31,7 @@ from lab.view.server_page import (
     PAUSE_S,
     LimitedConnection,
     LimitedSocket,
+    Listener,
     News,
     PageQueue,
     ScenePanel,
@@ -43,6 +44,7 @@ FLUSH_S, GRACE_S, STOP_S = 0.5, 1, 3.0
 POLL_S = 0.2  # interval at which the panel is asked for news
 READ_S = 0.005  # least interval between two messages from a page, against flooding
 MAX_PAGES = 32
+PART = 1 << 16  # bytes of a file that are sent at once
 MAX_MESSAGE = 1 << 16  # bytes; a longer one ends the connection
 NO_TOKEN = "This page needs the token of its address: open the whole link that the lab printed.\n"
 HEADERS = {
@@ -122,7 +124,7 @@ class Server:
     async def _serve(self) -> None:
         self._loop, self._stopped = asyncio.get_running_loop(), asyncio.Event()
         self._loop.set_exception_handler(quiet_when_full)
-        server = Uvicorn(config_of(self._application()))
+        server = Uvicorn(config_of(self._application(), self._socket))
         serving = asyncio.create_task(server.serve(sockets=[self._socket]))
         polling = asyncio.create_task(self._poll())
         self._ready.set()
@@ -151,7 +153,7 @@ class Server:
         file = self._files.get(request.path_params.get("name", ""))
         if file is None:
             return PlainTextResponse("There is no such page.\n", 404)
-        return Response(file.content, headers={"Content-Security-Policy": file.policy}, media_type=file.kind)
+        return answer_of(file)
 
     async def _poll(self) -> None:
         """Poll the panel for news that nobody announced with `wake`."""
@@ -220,12 +222,29 @@ def _from_here(asked: HTTPConnection) -> bool:
     return origin is None or urlsplit(origin)[:2] == ("http", asked.headers.get("host", ""))
 
 
-def config_of(application: Any, **more: Any) -> Config:
+def answer_of(file: File) -> Response:
+    """The response with a file; a large one in parts, each sent once the one before is on its way."""
+    headers = {"Content-Security-Policy": file.policy}
+    if len(file.content) <= PART:
+        return Response(file.content, headers=headers, media_type=file.kind)
+
+    async def parts() -> AsyncIterator[bytes]:
+        for begin in range(0, len(file.content), PART):
+            yield file.content[begin : begin + PART]
+            await asyncio.sleep(0)  # others have their turn, and a cut connection is noticed
+
+    return StreamingResponse(
+        parts(), headers=headers | {"Content-Length": str(len(file.content))}, media_type=file.kind
+    )
+
+
+def config_of(application: Any, listener: Listener, **more: Any) -> Config:
     """The configuration of a server with the lab's limits and headers; more: of uvicorn, such as a certificate."""
+    http: Any = partial(LimitedConnection, knocking=listener.knocking)
     return Config(
         application,
         loop="asyncio",
-        http=LimitedConnection,
+        http=http,
         ws=LimitedSocket,
         backlog=BACKLOG,
         ws_max_size=MAX_MESSAGE,
@@ -243,12 +262,12 @@ def config_of(application: Any, **more: Any) -> Config:
     )
 
 
-def listening(port: int, address: str = ADDRESS, what: str = "the live view") -> socket.socket:
+def listening(port: int, address: str = ADDRESS, what: str = "the live view") -> Listener:
     """A socket that listens, by default on this computer alone; port 0 takes a free one.
 
     what: who wants it, for messages. Raises BadInput for a port that is taken or not allowed, and a wrong address.
     """
-    own = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    own = Listener()
     try:
         keep_port(own)
         own.setblocking(False)

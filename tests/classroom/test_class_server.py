@@ -12,11 +12,12 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosedError, InvalidStatus
 
 from lab.advice.answer_times import read_times
+from lab.classroom import class_server
 from lab.classroom.class_place import Place
 from lab.classroom.class_server import ClassServer
+from lab.classroom.door import WRONG
 from lab.classroom.room import PupilPage, Room
 from lab.classroom.roster import Roster
-from lab.classroom.wrong_codes import WRONG
 from lab.seat.lesson_seat import LessonSeat
 from lab.seat.run_progress import RunProgress
 from lab.teaching.lesson import teach
@@ -259,6 +260,31 @@ def test_a_wrong_wish_of_the_teacher_is_answered(server: ClassServer, message: s
     assert at_page(server, teacher(server), wished)["refusal"]
 
 
+def test_the_teacher_closes_the_door_and_takes_a_seat_away(server: ClassServer) -> None:
+    page = join(server)["page"]
+
+    async def swept() -> int | None:
+        async with connect(frames(server, teacher(server))) as desk, connect(frames(server, page)) as pupil:
+            await seated(pupil)
+            await does(desk, do="door", open=False)
+            await until(desk, lambda news: news.get("class", {}).get("open") is False)
+            await does(desk, do="remove", pupil=1)
+            assert (await until(desk, lambda news: news.get("removed")))["removed"] == [1]
+            await does(desk, do="hint", pupil=1, text="x")
+            assert "pupil 1" in (await until(desk, lambda news: news.get("refusal")))["refusal"]
+            return await code_of_closing(pupil)
+
+    assert asyncio.run(swept()) == 1001
+    assert asked(server, "/join", {"code": server.roster.code})[0] == 403
+    with pytest.raises(InvalidStatus):
+        at_page(server, page, question)
+    server.stop()
+    with ClassServer(Roster.read(server.roster.folder), Place()) as again:
+        assert again.call(again.room.tiles) == {}
+        assert join(again)["page"]
+        assert [*again.call(again.room.tiles)] == [2]
+
+
 # ---- who may not
 
 
@@ -308,6 +334,27 @@ def test_codes_cannot_be_tried_one_after_the_other(server: ClassServer) -> None:
     states = [asked(server, "/join", {"code": f"wrong{n}"})[0] for n in range(WRONG + 2)]
     assert states == [403] * WRONG + [429] * 2
     assert asked(server, "/join", {"code": server.roster.code})[0] == 429
+
+
+def test_a_page_that_comes_and_goes_has_to_wait(server: ClassServer, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(class_server, "MOST_OPENED", 2)
+    page = join(server)["page"]
+    for _ in range(2):
+        at_page(server, page, question)
+    with pytest.raises(InvalidStatus) as refused:
+        at_page(server, page, question)
+    assert refused.value.response.status_code == 429
+
+
+def test_a_message_that_is_no_text_is_refused_and_the_page_stays(server: ClassServer) -> None:
+    async def said(page: ClientConnection) -> Json:
+        await seated(page)
+        await page.send(b"\0")
+        await until(page, lambda news: news.get("refusal"))
+        await page.send("{}")
+        return await until(page, lambda news: news.get("refusal"))
+
+    assert at_page(server, join(server)["page"], said)["refusal"]
 
 
 def test_another_site_and_another_host_are_refused(server: ClassServer) -> None:

@@ -1,6 +1,7 @@
 """The roster of a class: who joins, by which name, and what is kept of it."""
 
 import json
+import stat
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ from hypothesis import strategies as st
 
 from lab.classroom.roster import FILE, LETTERS, NAME_LENGTH, Full, Pupil, Roster, clean_name, hash_of
 from lab.errors import BadInput
+from lab.operating_system import WINDOWS
 from lab.teaching.lesson_options import LessonOptions
 
 
@@ -84,6 +86,25 @@ def test_a_pupil_goes_on_to_a_lesson_that_there_is(tmp_path: Path, lesson: Lesso
     for number, wrong in ((1, 2), (1, -1), (2, 0), (0, 0)):
         with pytest.raises(BadInput):
             made.move(number, wrong)
+
+
+def test_a_removed_pupil_has_no_key_and_leaves_the_name_to_another_one(tmp_path: Path, lesson: LessonOptions) -> None:
+    made = roster(tmp_path / "a", lesson, typed=True)
+    first, key = joined(made, "Eve")
+    made.remove(1)
+    assert made.of_key(key) is made.of_key("") is None
+    assert made.present == []
+    second, _ = joined(made, "Eve")
+    assert (second.number, second.name) == (2, first.name)
+    assert Roster.read(tmp_path / "a") == made
+    with pytest.raises(BadInput, match="pupil 3"):
+        made.remove(3)
+
+
+@pytest.mark.skipif(WINDOWS, reason="rights of POSIX")
+def test_nobody_else_reads_the_folder_of_a_class(tmp_path: Path, lesson: LessonOptions) -> None:
+    made = roster(tmp_path / "a", lesson)
+    assert stat.S_IMODE(made.folder.stat().st_mode) == 0o700
 
 
 def test_a_class_is_never_written_over(tmp_path: Path, lesson: LessonOptions) -> None:
