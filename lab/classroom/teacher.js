@@ -45,7 +45,7 @@ function showTiles(tiles) {
 }
 
 const HEADS = [
-  ["lesson", "Lesson"], ["name", "Pupil"], ["solved", "Goal reached"], ["final_steps", "Steps at the end"], ["optimal_steps", "Fewest possible"], ["episodes", "Episodes"],
+  ["lesson", "Lesson"], ["name", "Pupil"], ["solved", "Solved"], ["final_steps", "Steps at the end"], ["optimal_steps", "Fewest possible"], ["episodes", "Episodes"],
   ["answers", "Answers"], ["own_choice_too", "Its own choice, too"], ["not_best", "Not the best"], ["misleads", "Did not help"], ["believed", "Believed to the end"], ["tau", "Skill (tau)"],
 ];
 const shown = (value) => (value === null ? "" : value === true ? "yes" : value === false ? "no" : typeof value === "number" && !Number.isInteger(value) ? value.toFixed(2) : String(value));

@@ -41,8 +41,15 @@ const classTile = (() => {
     return svg;
   }
 
+  // How the lesson of a tile ended: solved, or how far it got; a longer path than the shortest is not solved
+  function ending({ solved, final_steps: steps, optimal }) {
+    if (solved) return `solved${steps ? ` in ${Math.round(steps)} steps` : ""}`;
+    return steps ? `not solved, ${Math.round(steps)} steps${optimal ? `, fewest ${optimal}` : ""}` : "not solved";
+  }
+
   function status(tile) {
-    if (tile.state !== "open") return [`${STATES[tile.state]}${tile.text ? `: ${tile.text}` : ""}${tile.state === "over" ? (tile.solved ? ": reached its goal" : ": did not reach its goal") : ""}`, tile.state];
+    if (tile.state === "over") return [`${STATES.over}: ${ending(tile)}`, tile.state];
+    if (tile.state !== "open") return [`${STATES[tile.state]}${tile.text ? `: ${tile.text}` : ""}`, tile.state];
     if (!tile.here && tile.asks) return ["asks, and nobody is there", "away"];
     if (tile.asks) return [`asks${tile.asked_s >= LONG_S ? `, waits ${Math.floor(tile.asked_s / 60)} min` : ""}`, tile.asked_s >= LONG_S ? "stuck" : "asks"];
     return [VERDICTS[tile.verdict] || "works alone", tile.verdict === "rejected" ? "dropped" : ""];

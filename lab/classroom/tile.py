@@ -38,6 +38,7 @@ def tile_of(pupil: Pupil, desk: Desk, here: bool, asked_s: float | None) -> Json
         "misleads": standing.get("misleads", 0),
         "verdict": standing.get("verdict", ""),
         "solved": None if desk.result is None else bool(desk.result["solved"]),
+        "final_steps": None if desk.result is None else desk.result["final_steps"],
     }
 
 
