@@ -84,7 +84,7 @@ function count() {
 }
 
 const HEADS = [
-  ["lesson", "Lesson"], ["name", "Pupil"], ["solved", "Goal reached"], ["final_steps", "Steps at the end"], ["optimal_steps", "Fewest possible"],
+  ["lesson", "Lesson"], ["name", "Pupil"], ["solved", "Solved"], ["final_steps", "Steps at the end"], ["optimal_steps", "Fewest possible"],
   ["cost", "Best order"], ["optimal_cost", "Proven optimum"], ["episodes", "Episodes"],
   ["answers", "Answers"], ["own_choice_too", "Its own choice, too"], ["not_best", "Not the best"], ["misleads", "Did not help"], ["believed", "Believed to the end"], ["tau", "Skill (tau)"],
 ];

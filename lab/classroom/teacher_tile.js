@@ -4,7 +4,6 @@
 const classTile = (() => {
   const SVG = "http://www.w3.org/2000/svg", WIDE = 240, HIGH = 64, LONG_S = 60, SURE_MS = 3000;
   const STATES = { idle: "", opening: "opens", open: "", over: "done", failed: "failed", stopped: "stopped", lost: "its process has ended" };
-  const ENDS = { steps: ["did not reach its goal", "reached its goal"], order: ["its order is not proven the best", "found a best order"] };
   const VERDICTS = { rejected: "dropped: its advice misled", converged: "needs no more advice", left: "works alone" };
 
   function make(name, text, kind) {
@@ -43,10 +42,18 @@ const classTile = (() => {
   }
 
   const best = ({ kind, best: least, optimal, proven }) => (kind !== "order" || least === null ? "" : `; best order ${Math.round(least)}${optimal ? `, ${proven ? "optimum" : "bound"} ${Math.round(optimal)}` : ""}`);
+  // How the lesson of a tile ended: solved, or how far it got; a longer path than the shortest is not solved
+  function ending({ kind, solved, final_steps: steps, optimal }) {
+    if (kind === "order") return solved ? "found a best order" : "its order is not proven the best";
+    if (solved) return `solved${steps ? ` in ${Math.round(steps)} steps` : ""}`;
+    return steps ? `not solved, ${Math.round(steps)} steps${optimal ? `, fewest ${optimal}` : ""}` : "not solved";
+  }
+
 
   function status(tile) {
     if (tile.state === "idle") return [tile.study ? tile.study.doing : "", tile.study && tile.study.doing === "finished" ? "over" : ""];
-    if (tile.state !== "open") return [`${STATES[tile.state]}${tile.text ? `: ${tile.text}` : ""}${tile.state === "over" ? `: ${ENDS[tile.kind][Number(tile.solved)]}` : ""}`, tile.state];
+    if (tile.state === "over") return [`${STATES.over}: ${ending(tile)}`, tile.state];
+    if (tile.state !== "open") return [`${STATES[tile.state]}${tile.text ? `: ${tile.text}` : ""}`, tile.state];
     if (!tile.here && tile.asks) return ["asks, and nobody is there", "away"];
     if (tile.asks) return [`asks${tile.asked_s >= LONG_S ? `, waits ${Math.floor(tile.asked_s / 60)} min` : ""}`, tile.asked_s >= LONG_S ? "stuck" : "asks"];
     return [VERDICTS[tile.verdict] || "works alone", tile.verdict === "rejected" ? "dropped" : ""];

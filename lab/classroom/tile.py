@@ -47,6 +47,7 @@ def tile_of(pupil: Pupil, desk: Desk, question: Json | None, here: bool, asked_s
         "misleads": standing.get("misleads", 0),
         "verdict": standing.get("verdict", ""),
         "solved": None if desk.result is None else is_solved(desk.result),
+        "final_steps": None if desk.result is None else desk.result.get("final_steps"),
     }
 
 
