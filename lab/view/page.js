@@ -194,7 +194,8 @@ function keepUp(steps) {
 }
 
 function follow(pause = 300) {
-  const socket = new WebSocket(new URL(`frames${location.search}`, location.href.replace(/^http/, "ws")));
+  const socket = typeof PolledSocket === "undefined" // polling.js, behind a proxy that passes no websockets
+    ? new WebSocket(new URL(`frames${location.search}`, location.href.replace(/^http/, "ws"))) : new PolledSocket();
   socket.onopen = () => {
     pause = 300;
     if (panel) panel.connected((message) => socket.send(JSON.stringify(message)));
