@@ -11,6 +11,7 @@ from typing import Annotated, Any, Unpack
 
 from annotated_types import Ge, Le, Lt
 
+from lab.advice.journal import Journal
 from lab.api.options import (
     Advisors,
     Settings,
@@ -23,7 +24,6 @@ from lab.api.options import (
     several,
     toolbox_of,
 )
-from lab.advice.journal import Journal
 from lab.api.pictures import Picture
 from lab.errors import BadInput, check_value
 from lab.lazy import pandas
@@ -53,9 +53,9 @@ class LessonResult:
     """The result of a lesson, which notebooks display.
 
     problem: the problem, with its table `problem.mdp`; lesson: the policy and the session's counts; document: the dict that
-    `lab teach --json` prints, without the items of other tasks' lessons and with a receipt only if a person was asked or `out` was
-    given; peers: the results of all peers if there were several,
-    otherwise (). Policy and session are then those of the best peer of the problem.
+    `lab teach --json` prints, without the items of other tasks' lessons, and with a receipt if a person was asked or `out` was
+    given; peers: the results of all peers if there were several, otherwise (). Policy and session are then those of the best peer
+    of the problem.
 
         >>> import lab
         >>> lesson = lab.teach(lab.world("S.#\\n..G"), gate="never", advisor=None)
@@ -198,7 +198,8 @@ def teach(
     settings: of learner and gate, by the names in docs/settings.md; `learner` and `gate` may also be classes.
 
     Raises BadInput for an unknown name, a value out of range, and what does not fit together; WorkFailed if the toolbox cannot
-    be reached; Interrupted, a KeyboardInterrupt, if the lesson is ended before its last episode. An error in an advisor, gate or learner of your own is raised as it is.
+    be reached; Interrupted, which is a KeyboardInterrupt, if the lesson is ended before its last episode. An error in an advisor,
+    gate or learner of your own is raised as it is.
 
         >>> import lab
         >>> lesson = lab.teach("world-1", advisor="expert", seed=1, episodes=100)
@@ -264,10 +265,14 @@ def _kept_options(
     for name, values in given.items():
         for value in values:
             if not isinstance(value, str | Path | None):
-                raise BadInput(f"out beside {name} {value!r} (lab.teach): a stored session holds names: give the {name} by name")
+                raise BadInput(
+                    f"out beside {name} {value!r} (lab.teach): a stored session holds names: give the {name} by name"
+                )
     others = [name for name, value in settings.items() if value is not None and name not in KEPT_SETTINGS]
     if others:
-        raise BadInput(f"out beside {others[0]} (lab.teach): a stored session holds the settings {', '.join(KEPT_SETTINGS)}")
+        raise BadInput(
+            f"out beside {others[0]} (lab.teach): a stored session holds the settings {', '.join(KEPT_SETTINGS)}"
+        )
     kept = {name: settings.get(name) for name in KEPT_SETTINGS}
     return LessonOptions(str(problem), task, sight, advisors=tuple(map(str, names)), seed=seed, **kept)
 

@@ -127,7 +127,9 @@ def several(advisors: Advisors) -> list[OneAdvisor]:
     return ["none" if advisors is None else advisors]
 
 
-def advising_of(advisors: Advisors, toolbox: ToolboxOrPlace, asked: Mapping[str, Ask] = MappingProxyType({})) -> Advising:
+def advising_of(
+    advisors: Advisors, toolbox: ToolboxOrPlace, asked: Mapping[str, Ask] = MappingProxyType({})
+) -> Advising:
     """The advisors of a session; the toolbox (None: the user's own) holds the policies that advise.
 
     asked: the functions that ask people, by the name of the advisor.

@@ -1,6 +1,6 @@
 """Pages that ask for their news by GET requests, where a proxy such as Colab's passes neither websockets nor POST requests.
 
-A page opens itself and then asks again and again. A request for news is answered when there is some, or with nothing after HOLD_S.
+A page opens itself and then asks again and again; a request for news is answered when there is some, or after HOLD_S.
 """
 
 import asyncio

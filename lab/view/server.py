@@ -217,7 +217,10 @@ class Server:
 
 
 class _Guard:
-    """Rejects requests without the token, and websockets that another site's page has opened; origin: of a page behind a proxy."""
+    """Rejects requests without the token, and websockets that another site's page has opened.
+
+    origin: of a page behind a proxy, "" for none.
+    """
 
     def __init__(self, app: ASGIApp, token: str, origin: str = "") -> None:
         self._app, self._token, self._origin = app, token.encode(), origin

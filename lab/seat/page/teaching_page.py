@@ -44,8 +44,9 @@ MOST_STATES = 50_000  # of problems whose shortest path is computed
 class SeatPage(LiveView):
     """The live page with a seat for one advisor; a context manager, like every live view.
 
-    wait_s: the time limit [s] for each answer; None: no limit. framing: see `LiveView`. All methods are called by the session's thread. Entering
-    raises BadInput for a port that is taken or not allowed, and for a `wait_s` that is not finite and above 0.
+    wait_s: the time limit [s] for each answer; None: no limit. framing: the pages that may show this one in a frame. All methods
+    are called by the session's thread. Entering raises BadInput for a port that is taken or not allowed, and for a `wait_s` that
+    is not finite and above 0.
     """
 
     def __init__(self, port: int = 0, *, wait_s: float | None = None, framing: Framing | None = None) -> None:
