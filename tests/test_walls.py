@@ -46,8 +46,10 @@ ALONE: dict[str, set[str]] = (
         "starlette": {
             "lab.view.server",
             "lab.view.server_page",
+            "lab.view.polled_pages",
             "lab.classroom.class_server",
             "lab.classroom.browser_socket",
+            "lab.classroom.door",
             "lab.classroom.step_pages",
         },
         "uvicorn": {"lab.view.server", "lab.view.server_page", "lab.classroom.class_server"},

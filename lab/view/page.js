@@ -195,7 +195,8 @@ function keepUp(steps) {
 
 function follow(pause = 300) {
   const search = typeof classBar === "undefined" ? location.search : classBar.search; // class_bar.js, on the pages of a class
-  const socket = new WebSocket(new URL(`frames${search}`, location.href.replace(/^http/, "ws")));
+  const socket = typeof PolledSocket === "undefined" // polling.js, behind a proxy that passes no websockets
+    ? new WebSocket(new URL(`frames${search}`, location.href.replace(/^http/, "ws"))) : new PolledSocket();
   socket.onopen = () => {
     pause = 300;
     if (panel) panel.connected((message) => socket.send(JSON.stringify(message)));

@@ -8,7 +8,7 @@ import asyncio
 import secrets
 import threading
 from collections.abc import AsyncIterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 from urllib.parse import urlsplit
@@ -26,6 +26,8 @@ from uvicorn import Server as Uvicorn
 
 from lab.errors import BadInput, WorkFailed
 from lab.operating_system import keep_port
+from lab.view.framing import Framing
+from lab.view.polled_pages import PolledPages, PolledSocket
 from lab.view.server_page import (
     BACKLOG,
     PAUSE_S,
@@ -67,14 +69,21 @@ class File:
 class Server:
     """Serves `files` ("" is the page) to requests with the token; `send` and `wake` may be called from any thread.
 
-    Raises BadInput for a port that is taken or not allowed.
+    framing: the pages that may show this one in a frame; None: none. Raises BadInput for a port that is taken or not allowed.
     """
 
-    def __init__(self, port: int, files: Mapping[str, File], token: str, panel: ScenePanel | None = None) -> None:
+    def __init__(
+        self,
+        port: int,
+        files: Mapping[str, File],
+        token: str,
+        panel: ScenePanel | None = None,
+        framing: Framing | None = None,
+    ) -> None:
         self._socket = listening(port)
         self.port: int = self._socket.getsockname()[1]
         self.connected = threading.Event()
-        self._files, self._token, self._panel = files, token, panel
+        self._files, self._token, self._panel, self._framing = files, token, panel, framing
         self._pages: set[PageQueue] = set()
         self._opened = 0
         self._known = News()
@@ -142,18 +151,22 @@ class Server:
         await asyncio.sleep(0)
 
     def _application(self) -> Starlette:
+        framing = self._framing or Framing(())
         guards = [
-            Middleware(TrustedHostMiddleware, allowed_hosts=HOSTS, www_redirect=False),
-            Middleware(_Guard, self._token),
+            Middleware(TrustedHostMiddleware, allowed_hosts=[*HOSTS, *framing.hosts], www_redirect=False),
+            Middleware(_Guard, self._token, framing.origin),
         ]
-        routes = [Route("/{name}", self._file), Route("/", self._file), WebSocketRoute("/frames", self._page)]
+        polled = PolledPages(self._serve_page, self._full).routes() if framing.polls else ()
+        routes = [*polled, Route("/{name}", self._file), Route("/", self._file), WebSocketRoute("/frames", self._page)]
         return Starlette(routes=routes, middleware=guards)
 
     async def _file(self, request: Request) -> Response:
         file = self._files.get(request.path_params.get("name", ""))
         if file is None:
             return PlainTextResponse("There is no such page.\n", 404)
-        return answer_of(file)
+        return answer_of(
+            replace(file, policy=file.policy if self._framing is None else self._framing.policy(file.policy))
+        )
 
     async def _poll(self) -> None:
         """Poll the panel for news that nobody announced with `wake`."""
@@ -162,12 +175,19 @@ class Server:
             if self._pages and self._panel is not None and self._panel.stirred():
                 self._wake()
 
+    def _full(self) -> str:
+        """Why no further page is served; "" if it is."""
+        return f"{MAX_PAGES} pages are open: close one.\n" if len(self._pages) >= MAX_PAGES else ""
+
     async def _page(self, socket: WebSocket) -> None:
-        """Serve one open page, from its first message to its last."""
-        if len(self._pages) >= MAX_PAGES:
-            await socket.send_denial_response(PlainTextResponse(f"{MAX_PAGES} pages are open: close one.\n", 503))
+        if why := self._full():
+            await socket.send_denial_response(PlainTextResponse(why, 503))
             return
         await socket.accept()
+        await self._serve_page(socket)
+
+    async def _serve_page(self, socket: WebSocket | PolledSocket) -> None:
+        """Serve one open page, from its first message to its last."""
         self._opened += 1
         page = PageQueue(self._opened, socket, self._panel)
         page.offer(self._known)
@@ -200,26 +220,31 @@ class Server:
 
 
 class _Guard:
-    """Rejects requests without the token, and websockets that another site's page has opened."""
+    """Rejects requests without the token, and websockets that another site's page has opened.
 
-    def __init__(self, app: ASGIApp, token: str) -> None:
-        self._app, self._token = app, token.encode()
+    origin: of a page behind a proxy, "" for none.
+    """
+
+    def __init__(self, app: ASGIApp, token: str, origin: str = "") -> None:
+        self._app, self._token, self._origin = app, token.encode(), origin
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         asked = HTTPConnection(scope)
         given = asked.query_params.get("token", "").encode()
         if not secrets.compare_digest(given, self._token):
             await PlainTextResponse(NO_TOKEN, 403)(scope, receive, send)
-        elif scope["type"] == "websocket" and not _from_here(asked):
+        elif scope["type"] == "websocket" and not _from_here(asked, self._origin):
             await PlainTextResponse("Another site's page may not connect.\n", 403)(scope, receive, send)
         else:
             await self._app(scope, receive, send)
 
 
-def _from_here(asked: HTTPConnection) -> bool:
-    """Whether the websocket was opened by a page of this server, or by a program that is no browser."""
+def _from_here(asked: HTTPConnection, proxied: str) -> bool:
+    """Whether the websocket was opened by a page of this server, or by a program that is no browser; proxied: see `_Guard`."""
     origin = asked.headers.get("origin")
-    return origin is None or urlsplit(origin)[:2] == ("http", asked.headers.get("host", ""))
+    if origin is None or (proxied and origin == proxied):
+        return True
+    return urlsplit(origin)[:2] == ("http", asked.headers.get("host", ""))
 
 
 def answer_of(file: File) -> Response:

@@ -4,7 +4,7 @@ import asyncio
 import json
 import socket
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, MutableMapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from errno import EMFILE, ENFILE, ENOBUFS, ENOMEM
@@ -12,7 +12,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any, Protocol
 
-from starlette.websockets import WebSocket, WebSocketDisconnect
+from starlette.websockets import WebSocketDisconnect
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.frames import Frame
@@ -247,10 +247,23 @@ class ScenePanel(Protocol):
         """The JSON members that this page has not received yet; "" for none."""
 
 
+class PageSocket(Protocol):
+    """What is used of the connection of one page: a websocket, or what stands for one."""
+
+    async def send_text(self, data: str) -> None:
+        """Send a message."""
+
+    async def close(self, code: int = 1000, reason: str | None = None) -> None:
+        """Close the connection."""
+
+    async def receive(self) -> MutableMapping[str, Any]:
+        """The next message of the page, or its disconnection."""
+
+
 class PageQueue:
     """The pending news of one page, and the task that sends them; `last`: the connection is closed after them."""
 
-    def __init__(self, number: int, socket: WebSocket, panel: ScenePanel | None) -> None:
+    def __init__(self, number: int, socket: PageSocket, panel: ScenePanel | None) -> None:
         self.number, self.socket, self._panel = number, socket, panel
         self.wake, self.last = asyncio.Event(), False
         self.sending: asyncio.Task[None]

@@ -35,6 +35,7 @@ from lab.seat.timed_answers import Asking
 from lab.sequencing.search import SequenceRequest
 from lab.teaching.events import ORDER, Event, LessonBegan, LessonEvent
 from lab.teaching.lesson_plan import LessonPlan
+from lab.view.framing import Framing
 from lab.view.meshcat import LiveView
 from lab.words.meaning import Intent, Refusal
 
@@ -45,14 +46,15 @@ MOST_STATES = 50_000  # of problems whose shortest path is computed
 class SeatPage(LiveView):
     """The live page with a seat for one advisor; a context manager, like every live view.
 
-    wait_s: the time limit [s] for each answer; None: no limit. All methods are called by the session's thread. Entering
-    raises BadInput for a port that is taken or not allowed, and for a `wait_s` that is not finite and above 0.
+    wait_s: the time limit [s] for each answer; None: no limit. framing: the pages that may show this one in a frame. All methods
+    are called by the session's thread. Entering raises BadInput for a port that is taken or not allowed, and for a `wait_s` that
+    is not finite and above 0.
     """
 
-    def __init__(self, port: int = 0, *, wait_s: float | None = None) -> None:
+    def __init__(self, port: int = 0, *, wait_s: float | None = None, framing: Framing | None = None) -> None:
         if wait_s is not None and not 0 < wait_s < inf:
             raise BadInput(f"time to wait for an answer, {wait_s} s: must be finite and above 0")
-        super().__init__(port, title=TITLE)
+        super().__init__(port, title=TITLE, framing=framing)
         self._wait_s = wait_s
         self._panel: SeatPanel = SeatPanel(TITLE)
         self._path = PathAhead()
