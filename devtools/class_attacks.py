@@ -194,7 +194,7 @@ def _ended(running: Running, sweeps: bool) -> int:
                 if "refusal" in news:
                     raise RuntimeError(f"the teacher is refused: {news['refusal']}")
                 tiles.update({tile["number"]: tile for tile in news.get("tiles", [])})
-                for number in news.get("removed", []):
+                for number in news.get("gone", []):
                     tiles.pop(number, None)
                 if wanted(news):
                     return

@@ -306,7 +306,7 @@ class Room:
         self._start(self.desks.pop(number).close())
 
     def _pupil(self, number: int) -> Pupil:
-        if number not in self.desks:
+        if not 1 <= number <= len(self.roster.pupils) or self.roster.pupils[number - 1].is_gone:
             raise BadInput(f"pupil {number}: nobody in the class has this number")
         return self.roster.pupils[number - 1]
 

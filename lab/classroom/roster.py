@@ -295,7 +295,8 @@ class Roster:
         return f"{COLOURS[colour]} {ANIMALS[animal]}"
 
     def _free(self, name: str) -> str:
-        taken = {pupil.name for pupil in self.pupils}
+        # a team's journal names its pupils, so there a name stands for one pupil alone
+        taken = {pupil.name for pupil in (self.pupils if self.teams else self.present)}
         others = (f"{name[: NAME_LENGTH - 4]} {number}" for number in range(2, len(taken) + 3))
         return name if name not in taken else next(other for other in others if other not in taken)
 

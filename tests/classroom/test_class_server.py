@@ -269,7 +269,7 @@ def test_the_teacher_closes_the_door_and_takes_a_seat_away(server: ClassServer) 
             await does(desk, do="door", open=False)
             await until(desk, lambda news: news.get("class", {}).get("open") is False)
             await does(desk, do="remove", pupil=1)
-            assert (await until(desk, lambda news: news.get("removed")))["removed"] == [1]
+            assert (await until(desk, lambda news: news.get("gone")))["gone"] == [1]
             await does(desk, do="hint", pupil=1, text="x")
             assert "pupil 1" in (await until(desk, lambda news: news.get("refusal")))["refusal"]
             return await code_of_closing(pupil)
