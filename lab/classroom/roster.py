@@ -25,6 +25,7 @@ FORMAT: Final = "teaching-lab class 1"
 MOST_BYTES = 1 << 22
 MOST_PUPILS = 60
 MOST_PARTICIPANTS = 500  # of a study, who are not all there at once
+MOST_NUMBERS = 5000  # with those of who has withdrawn
 NAME_LENGTH = 24
 LETTERS = "23456789abcdefghjkmnpqrstuvwxyz"  # without those that look alike
 CODE_LENGTH = 6
@@ -195,7 +196,7 @@ class Roster:
 
     def check_room(self) -> None:
         """Raises Full unless another pupil may join."""
-        if len(self.present) >= self.most:
+        if len(self.present) >= self.most or len(self.pupils) >= MOST_NUMBERS:
             raise Full(f"This class is full: it has {self.most} seats.")
 
     @property
