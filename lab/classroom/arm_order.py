@@ -37,8 +37,10 @@ def arms_at(design: Design, arms: Sequence[str], position: int, seed: int) -> tu
     """
     rows = rows_of(design, len(arms))
     if not rows:
-        drawn = np.random.default_rng([seed, ORDER, position]).permutation(len(arms))
+        rng = np.random.default_rng([seed, ORDER, position])
+        drawn = rng.permutation(len(arms))
     else:
         block, place = divmod(position, len(rows))
-        drawn = np.asarray(rows[int(np.random.default_rng([seed, ORDER, block]).permutation(len(rows))[place])])
+        rng = np.random.default_rng([seed, ORDER, block])
+        drawn = np.asarray(rows[int(rng.permutation(len(rows))[place])])
     return tuple(arms[int(arm)] for arm in drawn)

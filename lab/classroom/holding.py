@@ -44,7 +44,7 @@ def place_of(
 def begun_words(server: ClassServer) -> list[str]:
     """The lines for the teacher when the class begins."""
     lines = [
-        f"pupils: {server.join_url}",
+        f"{'pupils' if server.roster.study is None else 'participants'}: {server.join_url}",
         f"code: {server.roster.code}",
         f"your own page, for nobody else: {server.teacher_url}",
     ]

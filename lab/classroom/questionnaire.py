@@ -88,13 +88,13 @@ class QuestionItem(Record):
     def shown(self) -> dict[str, Any]:
         """What the page of the item needs, without the keys of other kinds."""
         low, high, step = self.range_
-        own: dict[str, Any] = {
+        own: dict[str, dict[str, Any]] = {
             "likert": {"points": self.point_count, "labels": self.labels},
             "scale": {"lowest": low, "highest": high, "step": step, "labels": self.labels},
             "choice": {"options": self.options},
             "text": {"most": self.most or MOST_CHARACTERS},
-        }[self.kind]
-        return {"name": self.name, "kind": self.kind, "text": self.text, "required": self.required} | own
+        }
+        return {"name": self.name, "kind": self.kind, "text": self.text, "required": self.required} | own[self.kind]
 
     def checked(self, value: object) -> Answer:
         """The answer, if the item allows it. Raises BadInput, for the participant to read."""

@@ -3,7 +3,7 @@
 import hashlib
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from shutil import rmtree
 
@@ -81,6 +81,10 @@ class Study:
             raise BadInput(
                 f"participant {person.participant} of '{self.roster.folder}' (--resume): the steps are not the protocol's"
             )
+        lesson = next((step.lesson for step in reversed(person.steps) if step.kind == "lesson"), None) or 1
+        pupil = self.roster.pupils[person.number - 1]
+        if pupil.lesson != lesson - 1:  # the roster could not be written when the lesson began
+            self.roster.pupils[person.number - 1] = replace(pupil, lesson=lesson - 1)
         return person
 
     def begin(self) -> None:

@@ -169,8 +169,8 @@ class StudyProtocol(Record):
             (("questionnaires",), "questionnaire", [asked.name for asked in self.questionnaires]),
         ]
         for number, asked in enumerate(self.questionnaires):
-            names = [item.name for item in asked.items]
-            groups.append((("questionnaires", number, "items"), f"item of questionnaire '{asked.name}'", names))
+            items = [item.name for item in asked.items]
+            groups.append((("questionnaires", number, "items"), f"item of questionnaire '{asked.name}'", items))
         for place, what, names in groups:
             for number, name in enumerate(names):
                 if name in names[:number]:

@@ -250,7 +250,9 @@ class StudyRoom(Room):
         step = self._step(number)
         if step is not None and step.lesson is not None and step.kind == "lesson":
             self._fresh.add(number)
-            self.seat(self.roster.move(number, step.lesson - 1))
+            with suppress(OSError):  # the record says where the participant is
+                self.roster.move(number, step.lesson - 1)
+            self.seat(self._pupil(number))
         elif number in self.desks:
             self._start(self.desks[number].close())
         else:

@@ -12,7 +12,7 @@ from lab.cli.output import console, show
 from lab.errors import BadInput, counted
 from lab.lazy import rich
 
-PUPILS = 30  # seats of a class
+SEATS = 30  # seats of a class
 
 
 def hold_class(
@@ -47,7 +47,7 @@ def hold_class(
             help="A study with people by this protocol (TOML), instead of a class with lessons.",
         ),
     ] = None,
-    pupils: Annotated[int, typer.Option("--pupils", min=1, max=60, help="The number of seats.")] = PUPILS,
+    pupils: Annotated[int, typer.Option("--pupils", min=1, max=60, help="The number of seats.")] = SEATS,
     teams: Annotated[
         int,
         typer.Option(
@@ -119,7 +119,7 @@ def hold_class(
             "--gate": gate,
             "--episodes": episodes,
             "--seed": seed,
-            "--pupils": pupils != PUPILS,
+            "--pupils": pupils != SEATS,
             "--teams": teams,
         }
         held = _study(study, out, tuple(trust_module or ()), [name for name, value in given.items() if value])

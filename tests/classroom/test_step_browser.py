@@ -1,5 +1,6 @@
 """The page of a study's steps in a browser: nothing is sent unanswered, texts are shown as text, and one may withdraw."""
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -62,4 +63,5 @@ def test_a_lesson_whose_time_is_up_offers_to_go_on(tmp_path: Path, browser_page:
         page.click("#class-go")
         page.wait_for_selector("legend:text('Mental demand')")
         assert page.inner_text("#where") == "P01, step 2 of 7"
-        assert [step.timed_out for step in server.call(lambda: server.room.study.people[1].steps)] == [True, False]
+        kept = json.loads((server.roster.folder / "01-P01" / "participant.json").read_text())
+        assert [step["timed_out"] for step in kept["steps"]] == [True, False]

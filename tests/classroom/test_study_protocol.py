@@ -42,6 +42,13 @@ def test_the_example_is_a_study_of_three_arms(tmp_path: Path) -> None:
     assert not (tmp_path / "study").exists()
 
 
+def test_the_example_on_the_page_is_a_protocol(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "study-with-people.md").read_text(encoding="utf-8")
+    (tmp_path / "study.toml").write_text(page.split("```toml\n")[1].split("```")[0])
+    study = Study.new(tmp_path / "study.toml", tmp_path / "study", subject_of)
+    assert [arm.name for arm in study.protocol.arms] == ["when-slow", "praise"]
+
+
 @pytest.mark.parametrize(
     ("before", "after", "line", "said"),
     [

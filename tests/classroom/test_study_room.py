@@ -1,9 +1,11 @@
 """A study with real lessons in their own processes, and participants who are programs."""
 
+import errno
 import json
 import shutil
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +14,8 @@ from websockets.asyncio.client import ClientConnection
 from websockets.exceptions import InvalidStatus
 
 from lab.classroom.class_server import ClassServer
-from lab.classroom.roster import Roster
+from lab.classroom.participant import Participant
+from lab.classroom.roster import Pupil, Roster
 from lab.classroom.study import PROTOCOL, Study
 from lab.errors import BadInput
 from tests.classroom.conftest import asked, at_page, question, until
@@ -92,11 +95,29 @@ def test_nothing_is_kept_before_the_consent_and_nothing_after_the_withdrawal(ser
     after = files(server)
     assert {*after} == {*before}
     assert not any(text.encode() in content for text in said for content in after.values())
-    assert json.loads(after["class.json"])["pupils"] == [{"number": 1, "name": "", "key_hash": "", "lesson": 0}]
+    assert json.loads(after["class.json"])["pupils"] == [asdict(Pupil(1, "", ""))]
     assert server.call(server.room.tiles) == {}
     assert asked(server, f"/step/state?token={key}")[0] == 403
     with pytest.raises(InvalidStatus):
         at_page(server, f"/desk/?token={key}", question)
+
+
+def test_a_full_disk_keeps_nobody_half(server: ClassServer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever could not be written may agree again, and has the first position of the design."""
+    person = Scripted.joined(server)
+
+    def full(*arguments: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Participant, "write", full)
+        status, said = person.tries(do="agree")
+    assert (status, "No space left" in said["error"]) == (500, True)
+    assert person.state()["kind"] == "consent"
+    assert server.roster.present == []
+    person.says(do="agree")
+    assert server.roster.study is not None
+    assert server.roster.study.positions == [None, 0]
 
 
 def test_a_withdrawal_that_was_cut_off_is_finished(server: ClassServer) -> None:

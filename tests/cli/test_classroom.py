@@ -10,6 +10,7 @@ import pytest
 from lab.classroom.class_lesson import ADVISORS
 from lab.classroom.roster import FILE, Roster
 from lab.teaching.lesson_options import LessonOptions
+from tests.classroom.scripted import study_in
 
 Lab = Callable[..., Any]
 EXAMPLE = Path(__file__).parents[2] / "examples" / "study_with_people.toml"
@@ -86,3 +87,25 @@ def test_a_report_is_written_of_a_class_that_is_over(lab: Lab, tmp_path: Path) -
     assert all(Path(file).is_file() for file in files)
     read = lab("class", "--report", str(tmp_path / "class"))
     assert "report.html" in read.out
+
+
+def test_a_study_whose_protocol_was_changed_does_not_go_on(lab: Lab, tmp_path: Path) -> None:
+    study = study_in(tmp_path)
+    study.begin()
+    study.roster.write()
+    path = tmp_path / "study" / "protocol.toml"
+    path.write_text(path.read_text() + "\n")
+    ran = lab("class", "--resume", str(tmp_path / "study"))
+    assert (ran.code, ran.out) == (2, "")
+    assert "has been changed" in ran.err
+    assert ran.err.count("\n") == 1
+
+
+def test_a_module_that_a_protocol_names_is_not_imported(lab: Lab, tmp_path: Path) -> None:
+    study_in(tmp_path)
+    path = tmp_path / "study.toml"
+    path.write_text(path.read_text().replace("small.txt", "gym:evil:X-v0"))
+    ran = lab("class", "--study", str(path), "--out", str(tmp_path / "study"))
+    assert (ran.code, ran.out) == (2, "")
+    assert "--trust-module evil" in ran.err
+    assert "line 16" in ran.err
