@@ -19,7 +19,7 @@ from lab.classroom.roster import Pupil, Roster
 from lab.classroom.tile import best_first, is_order, row_of
 from lab.errors import BadInput
 from lab.files import is_file, read_limited
-from lab.learning.session_events import AdviceEnded, AdviceRejected, EpisodeEnded
+from lab.learning.session_events import AdviceRejected, EpisodeEnded
 from lab.sequencing.cell.objectives import MAKESPAN
 from lab.statistics import proportion_interval
 
@@ -68,6 +68,7 @@ class Worth:
     mean_after: float | None
     against_best: int | None
     lines: list[str]
+    score: str = "steps"
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,7 @@ class TaughtLesson:
 
     row: None if it is not over. curve: of each episode the steps (or the cost of its order), and whether it was advised.
     worth: None if its journal cannot be read; trouble says why. dropped_at: the episode in which the learner rejected the advice,
-    ended: why it asks no more; None and "" otherwise. moves: of its best order, in words.
+    None if it did not. moves: of its best order, in words.
     """
 
     pupil: Pupil
@@ -94,7 +95,6 @@ class TaughtLesson:
     curve: tuple[tuple[float, bool], ...] = ()
     worth: Worth | None = None
     dropped_at: int | None = None
-    ended: str = ""
     moves: tuple[str, ...] = ()
     trouble: str = ""
 
@@ -148,6 +148,13 @@ class LessonRecord:
     def is_timed(self) -> bool:
         """Whether the cost of an order is its makespan [s]; False while nobody has finished the lesson."""
         return any(row.objective == MAKESPAN for row in self.finished)
+
+    @property
+    def unit(self) -> str:
+        """What a curve shows, for its axis."""
+        if self.about_order:
+            return f"best order so far{' [s]' if self.is_timed else ''}"
+        return next((one.worth.score for one in self.taught if one.worth is not None), "steps")
 
     @cached_property
     def middle(self) -> Middle | None:
@@ -215,7 +222,6 @@ def _taught(pupil: Pupil, folder: Path, lesson: int) -> TaughtLesson:
         tuple((float(one.steps), one.guided) for one in entries if isinstance(one, EpisodeEnded)),
         worth,
         next((one.episode for one in entries if isinstance(one, AdviceRejected)), None),
-        next((one.reason for one in entries if isinstance(one, AdviceEnded)), ""),
         tuple(moves[:MOST_MOVES]),
         trouble,
     )

@@ -65,7 +65,7 @@ def what_was_believed(one: TaughtLesson) -> str:
     if one.worth is None:
         return "unknown"
     if not one.worth.taken:
-        return "was given no answer"
+        return "not given"
     return "believed to the end" if one.row is not None else "believed so far"
 
 

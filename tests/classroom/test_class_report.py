@@ -115,7 +115,8 @@ def test_the_folder_tells_what_was_taught(roster: Roster) -> None:
     assert all(advised for _, advised in names[1].curve)
     assert names[2].good is not None
     assert names[2].good[0] == 0
-    assert (names[3].worth is not None and names[3].worth.taken, names[3].ended) == (0, "advisor left")
+    assert names[3].worth is not None
+    assert (names[3].worth.taken, names[3].good) == (0, None)
     assert (names[4].row, names[4].curve) == (None, ())
     assert (names[5].row, names[5].worth) == (None, None)
     assert names[5].trouble
@@ -147,6 +148,8 @@ def test_a_class_has_a_report_and_a_page_for_each_pupil(roster: Roster) -> None:
     assert "data:image/png;base64," not in pages[3]
     assert "6 of them with your help" in pages[0]
     assert "The best order that your learner found" in pages[0]
+    assert "Your advice was: believed to the end." in pages[0]
+    assert "Your advice was: not given." in pages[2]
     assert "still learning after 0 episodes" in pages[3]
     table = Path(document["files"]["table"]).read_text(encoding="utf-8").splitlines()
     assert len(table) == 1 + len(document["rows"]) == 1 + 4

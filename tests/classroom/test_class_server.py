@@ -223,7 +223,7 @@ def test_a_pupil_gets_the_seat_back_when_help_ends_also_after_the_helping_page_w
 ) -> None:
     said: list[Json] = []
 
-    async def say(message: Json) -> None:
+    async def say(message: Any) -> None:
         said.append(message)
 
     async def helped_twice() -> None:
