@@ -4,10 +4,11 @@ The journal alone reproduces a session, and holds no times: with the same answer
 """
 
 from dataclasses import dataclass, field
+from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any
 
-from annotated_types import Ge
+from annotated_types import Ge, Le, Predicate
 
 from lab.advice.entries import Name
 from lab.advice.journal import Journal
@@ -17,6 +18,7 @@ from lab.files import read_limited
 
 FILE = "times.jsonl"
 MAX_BYTES = 256 << 20
+MOST_S = 1e9  # of an answer: thirty years
 MEANS = {  # by which an answer is given -> what that is
     "move": "a button, a key or a word for one move",
     "path": "the first move of a path that was drawn or typed",
@@ -33,6 +35,17 @@ MEANS = {  # by which an answer is given -> what that is
 }
 
 
+def is_moment(text: str) -> bool:
+    """Whether a text is a date and time as ISO 8601 with a zone."""
+    try:
+        return datetime.fromisoformat(text).tzinfo is not None
+    except ValueError:
+        return False
+
+
+Moment = Annotated[str, Predicate(is_moment)]
+
+
 @dataclass(frozen=True)
 class AnswerTime:
     """How one answer was given.
@@ -45,8 +58,8 @@ class AnswerTime:
     entry: Annotated[int, Ge(1)]
     by: Name
     means: Name
-    shown: str | None
-    latency_s: Annotated[float, Ge(0.0)] | None
+    shown: Moment | None
+    latency_s: Annotated[float, Ge(0.0), Le(MOST_S)] | None
     said: tuple[str, ...] = ()
     seen: dict[str, Any] = field(default_factory=dict)
 

@@ -11,9 +11,9 @@ from pathlib import Path
 from statistics import mean, median
 from typing import Any, Literal
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import FiniteFloat, TypeAdapter, ValidationError
 
-from lab.advice.answer_times import AnswerTime, read_times
+from lab.advice.answer_times import AnswerTime, Moment, read_times
 from lab.advice.entries import FILE as JOURNAL
 from lab.advice.entries import Answer, Closed, Entry, Praise, Read, Undone, is_unbegun, read_journal, undoable
 from lab.classroom.roster import FILE as ROSTER
@@ -51,10 +51,10 @@ class Step:
     name: str
     arm: str | None
     lesson: int | None
-    began: str
-    ended: str | None = None
+    began: Moment
+    ended: Moment | None = None
     timed_out: bool = False
-    answers: dict[str, int | float | str | bool | None] = field(default_factory=dict)
+    answers: dict[str, int | FiniteFloat | str | bool | None] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -210,6 +210,7 @@ def _measures(read: Read, receipt: Row, answers: Sequence[Row]) -> Row:
         "answers": sum(answer["action"] is not None or answer["praise"] is not None for answer in counted),
         "skipped": sum(answer["means"] == "skip" for answer in counted),
         "undone": len(answers) - len(counted),
+        "helped_answers": sum(answer["helped"] is True for answer in counted),
         "own_choice_too": sum(entry.action == entry.own for entry in own),
         "not_best": receipt.get("against_best"),
         "helped_steps": sum(episode.helped_steps for episode in episodes),
@@ -248,6 +249,7 @@ def _answers(read: Read, times: Mapping[int, AnswerTime]) -> Iterator[Row]:
             "praise": entry.value if isinstance(entry, Praise) else None,
             "moves": entry.moves if isinstance(entry, Praise) else None,
             "undone": number in undone,
+            "helped": page.get("helped") if isinstance(page, dict) else None,
             "means": means if time is None else time.means,
             "shown": None if time is None else time.shown,
             "latency_s": None if time is None else time.latency_s,
@@ -290,14 +292,9 @@ def _spanned(times: Sequence[AnswerTime]) -> Row:
 
 
 def _seconds(began: str, ended: str | None) -> float | None:
-    try:
-        return None if ended is None else round((_moment(ended) - _moment(began)).total_seconds(), 3)
-    except (ValueError, TypeError):
-        raise BadInput(f"times {began!r} and {ended!r} of a participant's step: wanted ISO 8601 with a zone") from None
-
-
-def _moment(text: str) -> datetime:
-    return datetime.fromisoformat(text)
+    if ended is None:
+        return None
+    return round((datetime.fromisoformat(ended) - datetime.fromisoformat(began)).total_seconds(), 3)
 
 
 # ---- questionnaires ------------------------------------------------------------------------------------------------------

@@ -78,6 +78,13 @@ _LESSONS: tuple[tuple[str, Type, str, str, str], ...] = (
     ),
     ("skipped", "integer", "answers", "Questions that were left to the learner.", "at least 0"),
     ("undone", "integer", "answers", "Answers that do not count because one was taken back.", "at least 0"),
+    (
+        "helped_answers",
+        "integer",
+        "answers",
+        "Those that the teacher gave for the participant, where times are kept.",
+        "at least 0",
+    ),
     ("own_choice_too", "integer", "answers", "Advised moves that were also the learner's own choice.", "at least 0"),
     (
         "not_best",
@@ -104,6 +111,7 @@ _ANSWERS: tuple[tuple[str, Type, str, str, str], ...] = (
     ("praise", "integer", "", "A judgement instead of a move: above 0 praise, below 0 blame.", ""),
     ("moves", "integer", "moves", "The number of moves that were judged.", "at least 0"),
     ("undone", "boolean", "", "Whether it was taken back, or belongs to what was.", "true, false"),
+    ("helped", "boolean", "", "Whether the teacher gave it for the participant.", "true, false"),
     ("means", "text", "", "How it was given.", ", ".join(MEANS)),
     ("shown", "time", "", "When the question was shown; empty if it was not.", ""),
     ("latency_s", "number", "s", "From then to the answer.", "at least 0"),

@@ -61,7 +61,7 @@ STOPPED = "stopped by Ctrl-C"
 GROUPS = {
     "toolbox": "The policies that were learned.",
     "task": "Task files.",
-    "study": "The thesis's tables and figures again, and comparisons of our own.",
+    "study": "The thesis's tables and figures again, comparisons of our own, and studies with people.",
 }
 
 

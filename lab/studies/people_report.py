@@ -1,5 +1,6 @@
 """The comparison of the arms of a study with people as a page, figures, and a JSON document."""
 
+import re
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -16,6 +17,7 @@ from lab.version import __version__
 from lab.view.canvas import BLUE, GREY, INK, picture_bytes
 
 TEMPLATE = Path(__file__).with_name("people.html")
+MOST_NAME = 80  # characters of a figure's file
 PAGE, FIGURES = "report.html", "figures"
 JITTER = 0.12  # of the distance between two arms
 NOTHING = "–"
@@ -52,7 +54,8 @@ def people_compared(
         notes=notes,
         measures=[_shown(measure, figures[measure.name]) for measure in compared],
     )
-    files = {PAGE: text.encode()} | {f"{FIGURES}/{name}.svg": picture for name, picture in figures.items()}
+    places = {name: f"{FIGURES}/{re.sub(r'[^A-Za-z0-9_]', '_', name)[:MOST_NAME]}.svg" for name in figures}
+    files = {PAGE: text.encode()} | {places[name]: picture for name, picture in figures.items()}
     try:
         (out / FIGURES).mkdir(parents=True, exist_ok=True)
         for name, content in files.items():
@@ -70,7 +73,7 @@ def people_compared(
         "seed": seed,
         "measures": [asdict(measure) for measure in compared],
         "notes": notes,
-        "files": {"report": str(out / PAGE)} | {name: str(out / FIGURES / f"{name}.svg") for name in figures},
+        "files": {"report": str(out / PAGE)} | {name: str(out / place) for name, place in places.items()},
     }
 
 

@@ -14,6 +14,7 @@ from lab.mdp import TabularMDP
 
 FORMAT = "teaching-lab-problem-1"
 MOST_BYTES = 32 << 20
+MOST_NAME = 1000  # characters
 _TABLES = {"successor": np.int32, "reward": np.float64, "terminal": np.uint8, "goal": np.uint8}
 _WORDS = ("name", "subtask", "start", "starts", "action_labels", "shape", "coverage_shape")
 
@@ -35,19 +36,29 @@ def decode(content: bytes, where: str) -> Problem:
     """The problem in these bytes. Raises BadInput, which begins with `where`, if anything is wrong."""
     try:
         length = int.from_bytes(content[:8], "little")
-        words = json_of(content[8 : 8 + length])["__metadata__"]
-        if words["format"] != FORMAT:
-            raise ValueError(f"format {words['format']!r}, allowed '{FORMAT}'")
-        held: dict[str, Any] = {name: json_of(words[name]) for name in _WORDS}
+        metadata = json_of(content[8 : 8 + length])["__metadata__"]
+        if metadata["format"] != FORMAT:
+            raise ValueError(f"format {metadata['format']!r}, allowed '{FORMAT}'")
+        held: dict[str, Any] = {name: json_of(metadata[name]) for name in _WORDS}
         tables: dict[str, Any] = load(content)
         for name, table in tables.items():
             if name not in _TABLES or table.dtype != _TABLES[name]:
                 raise ValueError(f"it holds '{name}' of type {table.dtype}")
-        if not all(isinstance(held[name], str) for name in ("name", "subtask")):
-            raise ValueError("its name is no text")
+        words = [held["name"], held["subtask"], *held["action_labels"]]
+        if not all(isinstance(word, str) and word.isprintable() and len(word) <= MOST_NAME for word in words):
+            raise ValueError(f"its names are no text of up to {MOST_NAME} printable characters")
         axes: dict[str, Any] = {
             name: tuple(held[name]) for name in ("starts", "action_labels", "shape", "coverage_shape")
         }
         return Problem(held["name"], held["subtask"], TabularMDP(**tables, start=held["start"], **axes))
-    except (BadInput, SafetensorError, ValueError, TypeError, KeyError, OverflowError, MemoryError) as error:
+    except (
+        BadInput,
+        SafetensorError,
+        ValueError,
+        TypeError,
+        KeyError,
+        AttributeError,
+        OverflowError,
+        MemoryError,
+    ) as error:
         raise BadInput(f"{where}: {' '.join(str(error).split())[:160] or type(error).__name__}") from None

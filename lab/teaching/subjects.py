@@ -1,7 +1,7 @@
 """The subjects of lessons, by name or object: worlds, skills, Gymnasium environments, tables, added problems; `lab.world`."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING
@@ -127,7 +127,7 @@ def subject_of(options: LessonOptions, kept: "KeptSession | None" = None) -> Sub
 def _kept_subject(options: LessonOptions, kept: "KeptSession", problem: Problem) -> Subject:
     """A problem whose code is not here, as the session's folder holds it, with the settings in its journal."""
     head = kept.read.session
-    subject = TableSubject(problem)
+    subject = TableSubject(replace(problem, name=head.problem))
     try:
         settings = Learned.model_validate({"learner": head.learner, "gate": head.gate})
     except ValidationError:

@@ -161,6 +161,7 @@ async def does(page: ClientConnection, **what: Any) -> None:
 
 
 def test_the_teacher_sees_pauses_hints_helps_and_goes_on(server: ClassServer) -> None:
+    server.roster.times = True
     said = join(server)
 
     async def seen() -> None:
@@ -198,6 +199,8 @@ def test_the_teacher_sees_pauses_hints_helps_and_goes_on(server: ClassServer) ->
 
     asyncio.run(seen())
     assert server.roster.pupils[0].lesson == 1
+    times = read_times(server.roster.folder / server.roster.pupils[0].folder / "lesson-1")
+    assert [time.seen["page"]["helped"] for time in times.values()] == [True]
 
 
 def test_a_finished_lesson_is_a_row_of_the_table_and_is_shown_again(server: ClassServer) -> None:
@@ -406,5 +409,8 @@ def test_the_times_of_answers_are_kept_on_request(server: ClassServer) -> None:
     times = read_times(folder)
     lines = [json.loads(line) for line in (folder / "events.jsonl").read_text().splitlines()]
     assert [lines[number - 1]["kind"] for number in times] == ["answer", "answer"]
-    assert [(time.by, time.means, time.seen["page"]["episodes"]) for time in times.values()] == [("web", "move", 0)] * 2
+    assert [(time.by, time.means) for time in times.values()] == [("web", "move")] * 2
+    assert [{**time.seen["page"], "sha256": ""} for time in times.values()] == [
+        {"episodes": 0, "notices": 0, "helped": False, "sha256": ""}
+    ] * 2
     assert all(time.latency_s is not None for time in times.values())

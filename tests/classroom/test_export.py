@@ -10,7 +10,18 @@ import pytest
 from lab.classroom.class_rows import rows_of
 from lab.classroom.export import csv_text, export
 from lab.errors import BadInput
-from tests.classroom.made_study import made_class, made_study, taught
+from tests.classroom.made_study import made_class, made_study, step, taught
+
+PERSON = json.dumps(
+    {
+        "format": "teaching-lab participant 1",
+        "participant": "silver deer",
+        "number": 1,
+        "order": [],
+        "consented": "",
+        "steps": [step("questionnaire", "tlx", 1, answers={"a": "x"})],
+    }
+)
 
 
 def table(path: Path) -> list[dict[str, str]]:
@@ -117,6 +128,8 @@ def test_parquet_holds_the_same_rows_with_types(tmp_path: Path) -> None:
         ("class.json", "{}", "class.json': format: "),
         ("class.json", None, "holds no class"),
         ("01-silver-deer/participant.json", '{"format": "x"}', "participant.json': format: "),
+        ("01-silver-deer/participant.json", PERSON.replace("T19", "T99"), "participant.json': steps.0.began: "),
+        ("01-silver-deer/participant.json", PERSON.replace('"x"', "NaN"), "participant.json': steps.0.answers."),
         ("01-silver-deer/lesson-1/receipt.json", "{", "receipt.json': "),
         ("01-silver-deer/lesson-1/times.jsonl", "{}\n", "times.jsonl': line 1: "),
         ("01-silver-deer/lesson-1/events.jsonl", "x\n", "events.jsonl' (DIR): line 1: "),

@@ -145,6 +145,12 @@ def test_a_class_without_arms_is_refused() -> None:
         compare_arms([row | {"arm": None} for row in within(SIX)])
 
 
+def test_a_column_cannot_lead_out_of_the_folder_of_figures(tmp_path: Path) -> None:
+    document = people_compared(within(SIX, "../../x_mean"), {"class": "c"}, tmp_path / "out", model=False)
+    assert document["files"]["../../x_mean"] == str(tmp_path / "out" / "figures" / "______x_mean.svg")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out"]
+
+
 def test_the_report_escapes_what_it_is_told_and_holds_its_figures(tmp_path: Path) -> None:
     rows = within({"<b>": SIX["a"], "y": SIX["b"]})
     document = people_compared(rows, {"class": "<i>", "withdrawn": 2}, tmp_path / "out", model=False)

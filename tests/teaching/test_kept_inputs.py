@@ -1,6 +1,8 @@
 """Sessions that are replayed without the files that they name: from the copies in their own folder."""
 
+import hashlib
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,13 +11,15 @@ import pytest
 
 from lab.advice.entries import Answer, read_journal
 from lab.errors import BadInput
+from lab.learning.gates import GATES
 from lab.learning.problem import Problem
 from lab.learning.requests import AdviceRequest
 from lab.mdp import grid
+from lab.plugins.code_file import take
 from lab.tasks.task_file import load
 from lab.teaching import problem_file
 from lab.teaching.events import unheard
-from lab.teaching.kept_inputs import FILE, INPUTS, TABLE, keep_inputs, read_inputs, replaced
+from lab.teaching.kept_inputs import FILE, INPUTS, TABLE, code_lines, keep_inputs, read_inputs, replaced, version_lines
 from lab.teaching.kept_session import KeptSession
 from lab.teaching.lesson import replay, teach
 from lab.teaching.lesson_options import LessonOptions
@@ -23,6 +27,7 @@ from lab.teaching.named_problems import PROBLEMS
 from lab.teaching.subjects import subject_of
 from lab.teaching.teacher import Teacher
 from lab.toolbox.registry import Toolbox
+from lab.version import __version__
 
 MAP = "S.#\n...\n#.G\n"
 URDF = (
@@ -108,6 +113,35 @@ def test_an_own_problem_is_replayed_without_its_code(tmp_path: Path) -> None:
         replayed(lesson)
 
 
+def test_own_code_that_is_not_here_or_was_changed_is_named_with_its_hash(tmp_path: Path) -> None:
+    path = tmp_path / "asking.py"
+    path.write_text("import lab\nclass Never(lab.Gate):\n    def opens(self, episode, scores): return False\n")
+    (tmp_path / "kept").mkdir()
+    name = take(GATES, f"{path}:Never")
+    keep_inputs(tmp_path / "kept", {}, members=["ccrl", name])
+    inputs = read_inputs(tmp_path / "kept")
+    assert inputs is not None
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    assert (inputs.code[name].file, inputs.code[name].sha256, code_lines(inputs)) == ("asking.py", digest, [])
+    path.write_text(path.read_text() + "# changed\n")
+    (line,) = code_lines(inputs)
+    assert line == f"gate '{name}' is not the one that the session ran: its asking.py had the SHA-256 {digest}"
+    elsewhere = replace(inputs, code={"other.Never": inputs.code[name]})
+    assert code_lines(elsewhere) == [
+        f"gate 'other.Never' is not here: it came from a file asking.py with the SHA-256 {digest}"
+    ]
+
+
+def test_other_versions_are_named_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "kept").mkdir()
+    keep_inputs(tmp_path / "kept", {})
+    inputs = read_inputs(tmp_path / "kept")
+    assert inputs is not None
+    assert version_lines(inputs) == []
+    (line,) = version_lines(replace(inputs, lab="0.0.1", libraries={"numpy": "1.0"}))
+    assert line == f"the session was made with lab 0.0.1 ({__version__} here), numpy 1.0 ({np.__version__} here)"
+
+
 def test_a_problem_is_the_same_from_its_file() -> None:
     problem = Problem(
         "board", "table", grid((1, 3), [[0, 0, 0]], (0, 0), (0, 2), None, ("up", "down", "left", "right"))
@@ -124,6 +158,10 @@ def test_a_problem_is_the_same_from_its_file() -> None:
     ):
         with pytest.raises(BadInput, match=r"^here: "):
             problem_file.decode(damaged, "here")
+    told = problem_file.encode(replace(problem, name="bo\x07rd"))
+    assert told is not None
+    with pytest.raises(BadInput, match="no text of up to 1000 printable characters"):
+        problem_file.decode(told, "here")
 
 
 @pytest.mark.parametrize(

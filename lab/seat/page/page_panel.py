@@ -49,6 +49,7 @@ class _Seen:
     refusal: str = ""
     held: str = ""
     run_due_s: float = 0.0
+    watches: bool = False
 
 
 class SeatPanel:
@@ -79,6 +80,7 @@ class SeatPanel:
         self.on_pace: Callable[[str], None] | None = None
         self.on_quit: Callable[[], None] | None = None
         self._answer: PageAnswer | None = None
+        self._helped = False  # whether the last answer came from a page that only watches by itself
         self._ended = False
         self._pages: dict[int, _Seen] = {}
         self._texts: dict[str, tuple[int, str]] = {}  # part, or layer -> its version and its JSON
@@ -146,13 +148,17 @@ class SeatPanel:
             self.lock.notify_all()
 
     def shown(self) -> dict[str, Any]:
-        """What is shown beside the question: the length of the curve, the number of notices, and a hash of the parts SEEN."""
+        """What is shown beside the question: the length of the curve, the number of notices, and a hash of the parts SEEN.
+
+        helped: whether the last answer came from a page that looks over the shoulder of the one that has the seat by itself.
+        """
         with self.lock:
             now = {part: PARTS[part](self.known, 0.0) for part in SEEN}
         text = plain_json(now).encode()
         return {
             "episodes": now["curve"]["count"],
             "notices": len(now["notices"]),
+            "helped": self._helped,
             "sha256": hashlib.sha256(text).hexdigest(),
         }
 
@@ -161,7 +167,7 @@ class SeatPanel:
     def joined(self, page: int, watches: bool = False) -> None:
         """A browser has opened the page; one that only watches neither counts nor gets the seat by itself."""
         with self.lock:
-            self._pages[page] = _Seen()
+            self._pages[page] = _Seen(watches=watches)
             if not watches:
                 self.chair.joined(page)
             self._count()
@@ -240,7 +246,7 @@ class SeatPanel:
             return ""
         assert isinstance(meant, PageAnswer)
         pending = self._checked(page, meant)
-        self._answer = meant
+        self._answer, self._helped = meant, self._pages[page].watches
         self.known.pending = None
         self.known.changed("question")
         self.lock.notify_all()
