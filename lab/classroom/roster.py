@@ -128,6 +128,11 @@ class Roster:
                 raise BadInput(
                     f"{where}: lesson '{options.subtask}' has the advisors {options.advisors}: pupils advise: {ADVISORS}"
                 )
+        seated = sum(not pupil.removed for pupil in kept.pupils)
+        if seated > kept.most or len(kept.pupils) > MOST_JOINED:
+            raise BadInput(
+                f"{where}: {seated} of {len(kept.pupils)} pupils have seats: {kept.most} of {MOST_JOINED} may"
+            )
         for number, pupil in enumerate(kept.pupils, start=1):
             if pupil.number != number or clean_name(pupil.name) != pupil.name or not 0 <= pupil.lesson < len(lessons):
                 raise BadInput(f"{where}: pupil {number} is {asdict(pupil)}: a file of lab class is wanted")

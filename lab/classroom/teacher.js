@@ -3,7 +3,7 @@
 
 const el = (id) => document.getElementById(id), { make } = classTile;
 const boxes = new Map(), SURE_MS = 3000;
-let socket = null, paused = false, wall = false, open = true, sure = 0;
+let socket = null, paused = false, wall = false, isOpen = true, sure = 0;
 
 // Everybody sees the address on a projector: its key goes into this window's memory
 if (location.search) {
@@ -30,9 +30,9 @@ function showClass(now) {
   paused = now.paused;
   el("pause").textContent = paused ? "Go on" : "Pause all";
   el("pause").setAttribute("aria-pressed", String(paused));
-  open = now.open;
-  el("door").textContent = open ? "Close the door" : "Open the door";
-  el("door").setAttribute("aria-pressed", String(!open));
+  isOpen = now.open;
+  el("door").textContent = isOpen ? "Close the door" : "Open the door";
+  el("door").setAttribute("aria-pressed", String(!isOpen));
   el("tried").hidden = !now.tried;
   el("picture").src = now.picture;
   el("address").textContent = now.join.replace(/\?.*/, "");
@@ -92,6 +92,7 @@ function showRows(rows) {
 }
 
 function follow(pause = 300) {
+  let first = true; // all tiles come in the first message
   socket = new WebSocket(new URL(`frames${key}`, location.href.replace(/^http/, "ws")));
   socket.onopen = () => { pause = 300; };
   socket.onmessage = (event) => {
@@ -99,7 +100,11 @@ function follow(pause = 300) {
     el("told").textContent = refusal || "";
     if (now) showClass(now);
     if (rows) showRows(rows);
-    if (tiles) showTiles(tiles);
+    if (tiles) {
+      if (first) removeTiles([...boxes.keys()].filter((number) => !tiles.some((tile) => tile.number === number)));
+      first = false;
+      showTiles(tiles);
+    }
     if (removed) removeTiles(removed);
   };
   socket.onclose = () => {
@@ -121,7 +126,7 @@ el("end").onclick = () => {
   el("end").textContent = "Once more: end it";
   setTimeout(() => { el("end").textContent = "End the class"; }, SURE_MS);
 };
-el("door").onclick = () => say({ do: "door", open: !open });
+el("door").onclick = () => say({ do: "door", open: !isOpen });
 el("csv").onclick = () => { // a link shows its address to whoever sees the screen
   el("csv").href = `class.csv${key}`;
   setTimeout(() => { el("csv").href = "#"; });
