@@ -66,6 +66,7 @@ class ClassAttack(Attack):
         own = f"127.{self.chance.randrange(1, 255)}.{self.chance.randrange(1, 255)}.{self.chance.randrange(1, 255)}"
         try:
             plain = socket.create_connection((self.host, self.port), ANSWER_S, (own, 0))
+            plain.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             return self.tls.wrap_socket(plain) if self.target.secured else plain
         except OSError:
             return None
@@ -204,6 +205,8 @@ def codes(attack: ClassAttack) -> None:
                 try:
                     connection.sendall(head.encode() + body)
                     answer = connection.recv(1 << 16)
+                    while answer and not answer.endswith(b"}"):
+                        answer += connection.recv(1 << 16)
                 except OSError:
                     break
                 looked += answer[9:12] == b"403"
@@ -314,7 +317,7 @@ def handshakes(attack: ClassAttack) -> None:
 def spy(attack: ClassAttack) -> None:
     """Look for secrets in what another user can read of the class's processes and of its folder."""
     there = [Path(f"/proc/{attack.server}")]
-    there += [folder for folder in Path("/proc").glob("[0-9]*") if _parent(folder) == attack.server]
+    there += [folder for folder in Path("/proc").glob("[0-9]*") if parent_of(folder) == attack.server]
     files = [folder / name for folder in there for name in ("cmdline", "environ", "comm", "stat", "maps")]
     if os.getuid() != 0:
         files += [Path(folder, name) for folder, _, names in os.walk(attack.target.folder) for name in names]
@@ -332,7 +335,8 @@ def spy(attack: ClassAttack) -> None:
             continue
 
 
-def _parent(process: Path) -> int:
+def parent_of(process: Path) -> int:
+    """The parent of a process, which is given by its folder in /proc; 0 if it has ended."""
     try:
         return int((process / "stat").read_text().rpartition(")")[2].split()[1])
     except (OSError, ValueError):
@@ -532,7 +536,7 @@ def sentences(attack: ClassAttack) -> None:
             attack.tries += 1
             said: dict[str, Any] = {"action": question["moves"][0]["action"]}
             if turn % 3 == 0:
-                said = {"say": MARKUP[:40] + " always go left at row 2"}
+                said = {"say": MARKUP[:28] + " always go left at row 2"}
             elif turn % 3 == 1 and "undo" in question["words"]:
                 said = {"word": "undo"}
             page.send(json.dumps({"answer": {"question": question["number"], **said}}))

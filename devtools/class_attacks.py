@@ -21,7 +21,7 @@ from typing import Any
 from urllib.error import HTTPError
 from urllib.request import Request, urlopen
 
-from devtools.class_attackers import ATTACKS, Target
+from devtools.class_attackers import ATTACKS, Target, parent_of
 from devtools.commands import LAB, environment, kill_session, module, search_path
 from devtools.parts import Outcome, Part
 
@@ -32,14 +32,17 @@ NAMES = ("Ada", "Emmy", "Sonja")
 TAUGHT = 60  # questions that each pupil answers; then the learner continues alone
 ATTACK_S = 6.0
 WAIT_S = 60.0  # the longest wait for anything, after which the class counts as lost
-MORE_MB = 150.0  # memory that the server may need beyond that of a class that nobody attacks
+MORE_MB = 150.0  # memory that the server, or a desk, may need beyond that of a class that nobody attacks
 MOST_KB = 4096.0  # that an attack may add to the class's folder
 ROUNDS = 6  # of the long run: every attack on every kind of class so often
 
 
 @dataclass(frozen=True)
 class Taught:
-    """How a class ended. journals: a hash of each honest pupil's; waits_s: from an answer to the next question, all of them."""
+    """How a class ended. journals: a hash of each honest pupil's; p95_s, longest_s: from an answer to the next question.
+
+    peak_mb, desk_mb: the most memory of the server, and of the largest process of a desk.
+    """
 
     code: int
     journals: dict[str, str]
@@ -47,8 +50,8 @@ class Taught:
     p95_s: float
     longest_s: float
     peak_mb: float
+    desk_mb: float
     disk_kb: float
-    seated: int
 
 
 @dataclass
@@ -110,7 +113,8 @@ def taught(folder: Path, secured: bool, attacked: Callable[[Running], Any], swee
             barrier = Barrier(len(NAMES), lambda: attack.append(pool.submit(attacked, running)))
             pupils = [pool.submit(_pupil, running, name, barrier, attack) for name in NAMES]
             waits_s = sorted(wait for pupil in pupils for wait in pupil.result())
-        seated = _ended(running, sweeps)
+        desk_mb = max(map(_peak_mb, _descendants(child.pid)), default=0.0)
+        _end(running, sweeps)
         _, status, used = os.wait4(child.pid, 0)
         child.returncode = os.waitstatus_to_exitcode(status)
     finally:
@@ -124,7 +128,7 @@ def taught(folder: Path, secured: bool, attacked: Callable[[Running], Any], swee
     size = sum(file.stat().st_size for file in own.rglob("*") if file.is_file())
     return Taught(
         child.returncode, journals, (folder / "stderr").read_text(errors="replace"), waits_s[int(0.95 * len(waits_s))],
-        waits_s[-1], used.ru_maxrss / 1024, size / 1024, seated,
+        waits_s[-1], used.ru_maxrss / 1024, desk_mb, size / 1024,
     )  # fmt: skip
 
 
@@ -183,8 +187,25 @@ def _pupil(running: Running, name: str, barrier: Barrier, attack: list[Any]) -> 
     return waits_s
 
 
-def _ended(running: Running, sweeps: bool) -> int:
-    """End the class from the teacher's page, and return the number of seats taken; see `taught` for sweeps."""
+def _descendants(process: int) -> set[int]:
+    """The processes that a process and its descendants have started."""
+    parents = {int(folder.name): parent_of(folder) for folder in Path("/proc").glob("[0-9]*")}
+    found, more = set[int](), {process}
+    while more:
+        more = {one for one, parent in parents.items() if parent in more}
+        found |= more
+    return found
+
+
+def _peak_mb(process: int) -> float:
+    with suppress(OSError):
+        if match := re.search(r"VmHWM:\s*(\d+) kB", Path(f"/proc/{process}/status").read_text()):
+            return int(match[1]) / 1024
+    return 0.0
+
+
+def _end(running: Running, sweeps: bool) -> None:
+    """End the class from the teacher's page; see `taught` for sweeps."""
     tiles: dict[int, Any] = {}
     with running.open(running.teacher) as page:
 
@@ -216,21 +237,22 @@ def _ended(running: Running, sweeps: bool) -> int:
         with suppress(Exception):
             while True:
                 page.recv(timeout=WAIT_S)
-    return len(tiles)
 
 
 def prepare(room: Path, seed: int) -> None:
-    """Hold the class that nobody attacks, once."""
-    if not (room / "quiet.json").exists():
-        quiet = taught(room / "quiet", False, lambda running: None)
-        assert quiet.code == 0, quiet.stderr
-        (room / "quiet.json").write_text(json.dumps(asdict(quiet)))
+    """Hold the classes that nobody attacks, once."""
+    for secured in (False, True):
+        kept = room / f"quiet-{secured}.json"
+        if not kept.exists():
+            quiet = taught(room / f"quiet-{secured}", secured, lambda running: None)
+            assert quiet.code == 0, quiet.stderr
+            kept.write_text(json.dumps(asdict(quiet)))
 
 
 def attempt(number: int, seed: int, room: Path) -> Outcome:
     """Attack one class in one way."""
     kind, secured = [*ATTACKS][number // 2 % len(ATTACKS)], bool(number % 2)
-    quiet = Taught(**json.loads((room / "quiet.json").read_text()))
+    quiet = Taught(**json.loads((room / f"quiet-{secured}.json").read_text()))
     tried: dict[str, Any] = {"tries": 0, "inside": ["the attacker did not begin"], "figures": {}}
 
     def attacked(running: Running) -> None:
@@ -265,8 +287,10 @@ def attempt(number: int, seed: int, room: Path) -> Outcome:
         return Outcome(group, case, f"the class was lost: {reason} {tried['inside'][:1]}"[:600], tried["tries"])
     figures = {
         "p95 ms": round(1000 * ended.p95_s),
+        "quiet p95 ms": round(1000 * quiet.p95_s),
         "longest ms": round(1000 * ended.longest_s),
         "MB": round(ended.peak_mb),
+        "desk MB": round(ended.desk_mb),
         "more KB": round(ended.disk_kb - quiet.disk_kb),
     }
     return Outcome(group, case, fault_of(ended, quiet, tried["inside"]), tried["tries"], figures | tried["figures"])
@@ -281,11 +305,11 @@ def fault_of(ended: Taught, quiet: Taught, inside: list[str]) -> str:
     if strange := [line for line in ended.stderr.splitlines() if line.strip() and not _expected(line)]:
         return f"stderr says {strange[0][:300]!r}"
     if ended.journals != quiet.journals:
-        return (
-            f"journals differ: {sorted(name for name in NAMES if ended.journals.get(name) != quiet.journals.get(name))}"
-        )
+        return f"journals differ: {sorted(name for name in quiet.journals if ended.journals.get(name) != quiet.journals[name])}"
     if ended.peak_mb > quiet.peak_mb + MORE_MB:
         return f"{ended.peak_mb:.0f} MB instead of {quiet.peak_mb:.0f} MB"
+    if ended.desk_mb > quiet.desk_mb + MORE_MB:
+        return f"a desk of {ended.desk_mb:.0f} MB instead of {quiet.desk_mb:.0f} MB"
     return f"{ended.disk_kb:.0f} KB written" if ended.disk_kb > quiet.disk_kb + MOST_KB else ""
 
 

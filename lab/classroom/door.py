@@ -22,7 +22,7 @@ WRONG, ALL_WRONG = 60, 300
 
 @dataclass
 class Often:
-    """Whether something happens too often: more than `most` times in `seconds`."""
+    """A limit: something may happen at most `most` times in `seconds`."""
 
     most: int
     seconds: float
@@ -45,7 +45,7 @@ class Door:
     joined: what is said to a new pupil with a code and a name, None for a wrong code; it raises Full, and OSError. clock: the
     time [s], for the limits.
 
-    is_open: whether anybody may join. tried: whether so many wrong codes came lately that some or all addresses have to wait.
+    is_open: whether anybody may join. tried: whether so many wrong codes came that some or all addresses have to wait.
     """
 
     def __init__(
@@ -58,15 +58,15 @@ class Door:
 
     @property
     def tried(self) -> bool:
+        """Whether somebody has to wait."""
         now_s = self._clock()
         return self._all.is_full(now_s) or any(wrong.is_full(now_s) for wrong in self._wrong.values())
 
     async def join(self, request: Request) -> JSONResponse:
         """A new pupil's address, for the right code."""
-        if not self.is_open:
-            return JSONResponse({"error": "The door of this class is closed: ask your teacher."}, 403)
-        if self._waits(request.client.host if request.client else ""):
-            return JSONResponse({"error": "Too many wrong codes: wait a minute."}, 429)
+        address = request.client.host if request.client else ""
+        if (refusal := self._refusal(address)) is not None:
+            return refusal
         try:
             body = await asyncio.wait_for(_body(request), BODY_S)
         except (TimeoutError, ClientDisconnect):
@@ -78,12 +78,9 @@ class Door:
             code, name = str(said["code"]), str(said.get("name", ""))
         except (ValueError, RecursionError, TypeError, KeyError, AttributeError):
             return JSONResponse({"error": "That is no request to join."}, 400)
-        return self._tried(request.client.host if request.client else "", code, name)
+        return self._refusal(address) or self._answer(address, code, name)  # much may have come while the body did
 
-    def _tried(self, address: str, code: str, name: str) -> JSONResponse:
-        """The answer to a code; the limit is looked at again, because other codes may have come while the body did."""
-        if self._waits(address):
-            return JSONResponse({"error": "Too many wrong codes: wait a minute."}, 429)
+    def _answer(self, address: str, code: str, name: str) -> JSONResponse:
         try:
             joined = self._joined(code, name)
         except Full as reason:
@@ -97,16 +94,16 @@ class Door:
             return JSONResponse({"error": "There is no class with this code: look at the board again."}, 403)
         return JSONResponse(joined)
 
-    def _waits(self, address: str) -> bool:
-        """Whether an address has to wait; addresses that have tried nothing lately are forgotten."""
+    def _refusal(self, address: str) -> JSONResponse | None:
+        """Why nobody from an address may try a code now; addresses that have tried none lately are forgotten."""
+        if not self.is_open:
+            return JSONResponse({"error": "The door of this class is closed: ask your teacher."}, 403)
         now_s = self._clock()
-        if self._all.is_full(now_s):
-            return True
-        wrong = self._wrong.get(address)
-        full = wrong is not None and wrong.is_full(now_s)
         if len(self._wrong) > ALL_WRONG:  # some of them are old: no more than ALL_WRONG codes are young
-            self._wrong = {one: tried for one, tried in self._wrong.items() if tried.is_full(now_s) or tried.times}
-        return full
+            self._wrong = {one: wrong for one, wrong in self._wrong.items() if wrong.is_full(now_s) or wrong.times}
+        if self._all.is_full(now_s) or (address in self._wrong and self._wrong[address].is_full(now_s)):
+            return JSONResponse({"error": "Too many wrong codes: wait a minute."}, 429)
+        return None
 
 
 async def _body(request: Request) -> bytes:

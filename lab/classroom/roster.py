@@ -167,6 +167,11 @@ class Roster:
             raise BadInput(
                 f"{where}: {len(kept.study.positions)} positions, {len(kept.pupils)} pupils: a file of lab class is wanted"
             )
+        seated = sum(not pupil.is_gone for pupil in kept.pupils)
+        if seated > kept.most or len(kept.pupils) > MOST_JOINED:
+            raise BadInput(
+                f"{where}: {seated} of {len(kept.pupils)} pupils have seats: {kept.most} of {MOST_JOINED} may"
+            )
         for number, pupil in enumerate(kept.pupils, start=1):
             is_named = pupil.number == number and clean_name(pupil.name) == pupil.name
             is_placed = 0 <= pupil.lesson < len(lessons) and (0 if kept.teams == 0 else 1) <= pupil.team <= kept.teams

@@ -5,7 +5,7 @@ const el = (id) => document.getElementById(id), { make } = classTile;
 const boxes = new Map(), SURE_MS = 3000;
 let END = "End the class";
 let study = null; // its title, and what this page may do in it
-let socket = null, paused = false, wall = false, open = true, sure = 0;
+let socket = null, paused = false, wall = false, isOpen = true, sure = 0;
 
 // Everybody sees the address on a projector: its key goes into this window's memory
 if (location.search) {
@@ -39,9 +39,9 @@ function showClass(now) {
     el("to-lesson").hidden = el("all").hidden = true;
     el("end").textContent = END = "End for now";
   }
-  open = now.open;
-  el("door").textContent = open ? "Close the door" : "Open the door";
-  el("door").setAttribute("aria-pressed", String(!open));
+  isOpen = now.open;
+  el("door").textContent = isOpen ? "Close the door" : "Open the door";
+  el("door").setAttribute("aria-pressed", String(!isOpen));
   el("tried").hidden = !now.tried;
   el("picture").src = now.picture;
   el("address").textContent = now.join.replace(/\?.*/, "");
@@ -56,10 +56,7 @@ function showClass(now) {
 }
 
 function showTiles(tiles, gone) {
-  for (const number of gone) {
-    boxes.get(number)?.box.remove();
-    boxes.delete(number);
-  }
+  removeTiles(gone);
   for (const tile of tiles) {
     if (!boxes.has(tile.number)) {
       boxes.set(tile.number, classTile.create(act));
@@ -75,7 +72,6 @@ function removeTiles(numbers) {
     boxes.get(number)?.box.remove();
     boxes.delete(number);
   }
-  count();
 }
 
 function count() {
@@ -107,6 +103,7 @@ function showRows(rows) {
 }
 
 function follow(pause = 300) {
+  let first = true; // all tiles come in the first message
   socket = new WebSocket(new URL(`frames${key}`, location.href.replace(/^http/, "ws")));
   socket.onopen = () => { pause = 300; };
   socket.onmessage = (event) => {
@@ -115,7 +112,11 @@ function follow(pause = 300) {
     if (now) showClass(now);
     if (rows) showRows(rows);
     if (teams) classTeams.show(teams);
-    if (tiles) showTiles(tiles, gone);
+    if (tiles) {
+      if (first) removeTiles([...boxes.keys()].filter((number) => !tiles.some((tile) => tile.number === number)));
+      first = false;
+      showTiles(tiles, gone);
+    }
   };
   socket.onclose = () => {
     el("how").textContent = "connection lost: trying again";
@@ -137,7 +138,7 @@ el("end").onclick = () => {
   el("end").textContent = "Once more: end it";
   setTimeout(() => { el("end").textContent = END; }, SURE_MS);
 };
-el("door").onclick = () => say({ do: "door", open: !open });
+el("door").onclick = () => say({ do: "door", open: !isOpen });
 for (const [id, file] of [["csv", "class.csv"], ["paper", "report.html"], ["handed", "hand-outs.html"]]) {
   el(id).onclick = () => { // a link shows its address to whoever sees the screen
     el(id).href = file + key;

@@ -144,6 +144,8 @@ def test_a_class_is_never_written_over(tmp_path: Path, lesson: LessonOptions) ->
         ("pupils", [{"number": 1, "name": "a", "key_hash": "", "lesson": 2}]),
         ("pupils", [{"number": 1}]),
         ("pupils", 3),
+        ("pupils", [{"number": n, "name": "a", "key_hash": "", "lesson": 0} for n in range(1, 5)]),
+        ("pupils", [{"number": n, "name": "a", "key_hash": "", "lesson": 0, "removed": True} for n in range(1, 902)]),
         ("lessons", [{"subtask": 5}]),
         ("lessons", "x"),
         ("lessons", []),

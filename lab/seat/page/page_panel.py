@@ -31,6 +31,7 @@ from lab.view.meshcat import GANTT_SCRIPT
 
 SLICE_EVERY_S = 0.1  # least time between two messages with a layer's values
 RUN_EVERY_S = 0.1  # least time between two messages with the status of a run
+MOST_LAYERS = 64  # whose values are kept, whatever numbers pages ask for
 SLICE_SHARE = 30  # computing a layer's values takes at most one part in so many of the time
 SEEN = ("curve", "standing", "notices", "members", "receipt")  # parts beside the question, of which a hash is kept
 CLOSED = PageAnswer(0, None, "closed")
@@ -83,7 +84,8 @@ class SeatPanel:
         self._helped = False  # whether the last answer came from a page that only watches by itself
         self._ended = False
         self._pages: dict[int, _Seen] = {}
-        self._texts: dict[str, tuple[int, str]] = {}  # part, or layer -> its version and its JSON
+        self._texts: dict[str, tuple[int, str]] = {}  # part -> its version and its JSON
+        self._layers: dict[int | None, tuple[int, str]] = {}  # the same of layers that pages have asked for
         self._stirred = 0
         self._late = False  # whether news were held back
         self._busy = ""  # the console's command under way at the last check
@@ -327,11 +329,12 @@ class SeatPanel:
         if now_s < seen.layer_due_s:
             self._late = True
             return None
-        key = f"layer {seen.layer}"
-        if self._texts.get(key, (-1, ""))[0] != version:
-            self._texts[key] = (version, plain_json(layer_of(self.known, seen.layer)))
+        if self._layers.get(seen.layer, (-1, ""))[0] != version:
+            if len(self._layers) >= MOST_LAYERS:
+                self._layers.clear()
+            self._layers[seen.layer] = (version, plain_json(layer_of(self.known, seen.layer)))
         seen.layer_version = version
-        text = self._texts[key][1]
+        text = self._layers[seen.layer][1]
         if text != "null":  # "no grid" is found out fast, and there may be a grid soon
             seen.layer_due_s = now_s + max(SLICE_EVERY_S, SLICE_SHARE * (time.monotonic() - now_s))
         return text
