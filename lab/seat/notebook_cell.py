@@ -11,12 +11,14 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from lab.errors import BadInput, LabError
+from lab.optional import optional
 from lab.seat.lesson_seat import LessonSeat
 from lab.seat.page.teaching_page import SeatPage
 from lab.seat.run_progress import RunProgress
 from lab.view.framing import Framing
 from lab.view.progress import EscapingConsole
 
+WHERE = "advisor 'web' (lab.teach)"
 HEIGHT = 640  # pixels of the page in a cell
 LOOPBACK = ("http://127.0.0.1:*", "http://localhost:*", "https://127.0.0.1:*", "https://localhost:*")
 VS_CODE = ("vscode-webview:", "vscode-file:")
@@ -43,7 +45,8 @@ class NotebookPlace:
         """The address of a page with its token."""
         if self.address:
             return f"{self.address.format(port=port)}?token={token}"
-        from google.colab.output import eval_js
+        with optional(WHERE):
+            from google.colab.output import eval_js
 
         return f"{str(eval_js(f'google.colab.kernel.proxyPort({port})')).rstrip('/')}/?token={token}"
 
@@ -55,7 +58,7 @@ def notebook_place(page: str | None) -> NotebookPlace:
     """
     if not in_notebook():
         raise BadInput(
-            "advisor 'web' (lab.teach): its page is shown in the cell of a notebook, and this is none: use the command "
+            f"{WHERE}: its page is shown in the cell of a notebook, and this is none: use the command "
             "lab teach ... --advisor web"
         )
     if page is not None:
@@ -119,7 +122,8 @@ def cell_seat(page: str | None) -> Iterator[LessonSeat]:
 
 def _show(url: str) -> Any:
     """Show the page at an address in the cell's output; returns IPython's handle, whose `update` replaces it."""
-    from IPython.display import display
+    with optional(WHERE):
+        from IPython.display import display
 
     frame = (
         f'<iframe src="{escape(url)}" width="100%" height="{HEIGHT}" style="border:0" title="Teaching lab"></iframe>'
