@@ -261,7 +261,11 @@ def _kept_options(
 ) -> LessonOptions:
     """The options of a session that is stored. Raises BadInput for what a journal cannot hold."""
     names = several(advisor)
-    given = {"problem": [problem], "advisor": names, **{name: [settings.get(name)] for name in ("learner", "gate")}}
+    given: dict[str, list[object]] = {
+        "problem": [problem],
+        "advisor": [*names],
+        **{name: [settings.get(name)] for name in ("learner", "gate")},
+    }
     for name, values in given.items():
         for value in values:
             if not isinstance(value, str | Path | None):
@@ -273,7 +277,7 @@ def _kept_options(
         raise BadInput(
             f"out beside {others[0]} (lab.teach): a stored session holds the settings {', '.join(KEPT_SETTINGS)}"
         )
-    kept = {name: settings.get(name) for name in KEPT_SETTINGS}
+    kept: dict[str, Any] = {name: settings.get(name) for name in KEPT_SETTINGS}
     return LessonOptions(str(problem), task, sight, advisors=tuple(map(str, names)), seed=seed, **kept)
 
 

@@ -1,22 +1,24 @@
 """The teaching page inside a notebook's cell: in Jupyter, VS Code and Colab, while the cell runs."""
 
 import os
+import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from html import escape
-from string import Formatter
 from typing import Any
 from urllib.parse import urlsplit
 
 from lab.errors import BadInput, LabError
+from lab.optional import optional
 from lab.seat.lesson_seat import LessonSeat
 from lab.seat.page.teaching_page import SeatPage
 from lab.seat.run_progress import RunProgress
 from lab.view.framing import Framing
 from lab.view.progress import EscapingConsole
 
+WHERE = "advisor 'web' (lab.teach)"
 HEIGHT = 640  # pixels of the page in a cell
 LOOPBACK = ("http://127.0.0.1:*", "http://localhost:*", "https://127.0.0.1:*", "https://localhost:*")
 VS_CODE = ("vscode-webview:", "vscode-file:")
@@ -25,7 +27,8 @@ COLAB = Framing(
     ("*.googleusercontent.com", "*.colab.dev"),
     polls=True,  # Colab's proxy passes no websockets
 )
-WANTED = 'wanted an address with {port}, such as "https://hub.example.org/user/me/proxy/{port}/"'
+WANTED = 'wanted an address with {port} in its path, such as "https://hub.example.org/user/me/proxy/{port}/"'
+ADDRESS = re.compile(r"https?://[\w.:-]+/([\w.~%@+/-]*/)?\{port\}(/[\w.~%@+/-]*)?")
 OVER = "The lesson was taught here: its page is closed, and its address is no longer valid."
 
 
@@ -42,8 +45,9 @@ class NotebookPlace:
     def url(self, port: int, token: str) -> str:
         """The address of a page with its token."""
         if self.address:
-            return f"{self.address.format(port=port)}?token={token}"
-        from google.colab.output import eval_js
+            return f"{self.address.replace('{port}', str(port))}?token={token}"
+        with optional(WHERE):
+            from google.colab.output import eval_js
 
         return f"{str(eval_js(f'google.colab.kernel.proxyPort({port})')).rstrip('/')}/?token={token}"
 
@@ -55,7 +59,7 @@ def notebook_place(page: str | None) -> NotebookPlace:
     """
     if not in_notebook():
         raise BadInput(
-            "advisor 'web' (lab.teach): its page is shown in the cell of a notebook, and this is none: use the command "
+            f"{WHERE}: its page is shown in the cell of a notebook, and this is none: use the command "
             "lab teach ... --advisor web"
         )
     if page is not None:
@@ -80,20 +84,14 @@ def _proxied(page: str) -> NotebookPlace:
     """The place behind a proxy with this address. Raises BadInput."""
     where = f"page {page!r} (lab.teach)"
     try:
-        fields = {name for _, name, _, _ in Formatter().parse(page) if name is not None}
-        parts = urlsplit(page.replace("{port}", "0"))
-        is_right = parts.scheme in ("http", "https") and parts.hostname and not (parts.query or parts.fragment)
+        parts = urlsplit(page)
+        host, number = parts.hostname, parts.port
     except (ValueError, AttributeError):
         raise BadInput(f"{where}: {WANTED}") from None
-    if (
-        fields != {"port"}
-        or not is_right
-        or not all(letter.isprintable() and letter not in " ;,'\"" for letter in page)
-    ):
+    if not (parts.scheme in ("http", "https") and host and ADDRESS.fullmatch(page)):
         raise BadInput(f"{where}: {WANTED}")
-    assert parts.hostname is not None
-    origin = f"{parts.scheme}://{parts.netloc}"
-    framing = Framing((origin, *LOOPBACK, *VS_CODE), (parts.hostname,), origin)
+    origin = f"{parts.scheme}://{host}" if number is None else f"{parts.scheme}://{host}:{number}"
+    framing = Framing((origin, *LOOPBACK, *VS_CODE), (host,), origin)
     return NotebookPlace(framing, f"{page.rstrip('/')}/")
 
 
@@ -119,7 +117,8 @@ def cell_seat(page: str | None) -> Iterator[LessonSeat]:
 
 def _show(url: str) -> Any:
     """Show the page at an address in the cell's output; returns IPython's handle, whose `update` replaces it."""
-    from IPython.display import display
+    with optional(WHERE):
+        from IPython.display import display
 
     frame = (
         f'<iframe src="{escape(url)}" width="100%" height="{HEIGHT}" style="border:0" title="Teaching lab"></iframe>'

@@ -74,10 +74,20 @@ def test_outside_a_notebook_it_is_refused(monkeypatch: pytest.MonkeyPatch) -> No
 
 @pytest.mark.parametrize(
     "page",
-    ["", "hub.example/{port}/", "https://hub.example/8000/", "https://h/{port}/?a", "{port}", "https://h/{x}/{port}/"],
+    [
+        "",
+        "hub.example/{port}/",
+        "https://hub.example/8000/",
+        "https://h/{port}/?a",
+        "{port}",
+        "https://h/{x}/{port}/",
+        "https://a-{port}.example/",
+        "https://me@h/{port}/",
+        "https://h:x/{port}/",
+    ],
 )
 def test_an_address_without_its_port_is_refused(cell: Cell, page: str) -> None:
-    with pytest.raises(BadInput, match=r"wanted an address with \{port\}"):
+    with pytest.raises(BadInput, match=r"wanted an address with \{port\} in its path"):
         notebook_place(page)
 
 

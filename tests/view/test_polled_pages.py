@@ -2,7 +2,8 @@
 
 import json
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any
 from urllib.error import HTTPError
 from urllib.parse import quote
@@ -15,6 +16,7 @@ from websockets.sync.client import connect
 from lab.sim.frames import Body, Frame, Shape
 from lab.view.framing import Framing
 from lab.view.meshcat import LiveView
+from lab.view.server_page import ScenePanel
 
 POLLED = Framing(("https://site.example",), ("*.site.example",), polls=True)
 PROXIED = Framing(("https://hub.example",), ("hub.example",), "https://hub.example")
@@ -24,7 +26,7 @@ AHEAD = (1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0)
 class Talk:
     """A panel that remembers what pages said, and when they came and left."""
 
-    files = ()
+    files: Sequence[Path] = ()
 
     def __init__(self) -> None:
         self.heard: list[Any] = []
@@ -55,7 +57,7 @@ def talk() -> Talk:
 @pytest.fixture
 def view(talk: Talk) -> Iterator[LiveView]:
     class WithPanel(LiveView):
-        _panel = talk
+        _panel: ScenePanel | None = talk
 
     with WithPanel(framing=POLLED) as running:
         running.show([Body("ball", (Shape("sphere", (0.1,)),))])
@@ -141,8 +143,8 @@ def test_requests_through_a_proxy_name_its_host(view: LiveView) -> None:
     assert status(view.url, Host="site.elsewhere") == 400
     with LiveView(framing=PROXIED) as proxied:
         address = proxied.url.replace("http", "ws").replace("/?", "/frames?")
-        with connect(address, origin="https://hub.example"):
+        with connect(address, additional_headers={"Origin": "https://hub.example"}):
             pass
         for origin in ("http://hub.example", "https://elsewhere.example", "https://hub.example.elsewhere"):
-            with pytest.raises(InvalidStatus, match="403"), connect(address, origin=origin):
+            with pytest.raises(InvalidStatus, match="403"), connect(address, additional_headers={"Origin": origin}):
                 pass
