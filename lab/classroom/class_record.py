@@ -165,20 +165,20 @@ class LessonRecord:
         """What is drawn of a pupil's lesson: the steps of the episodes, or the cost of the best order so far."""
         return one.best_so_far if self.about_order else one.curve
 
-    @property
-    def best_teacher(self) -> TaughtLesson | None:
+    @cached_property
+    def best_teachers(self) -> list[TaughtLesson]:
         """Whose advice was good most surely, by the receipts, of the finished lessons whose learner believed it to the end.
 
-        The measure is the lower end of the 95 % interval of the share of good advice (see `TaughtLesson.good`).
+        The measure is the lower end of the 95 % interval of the share of good advice (see `TaughtLesson.good`); all who are equal
+        in it, and nobody with 0.
         """
-        surest, best = 0.0, None
-        for one in self.taught:
-            if one.row is None or one.dropped_at is not None or one.good is None:
-                continue
-            _, low, _ = proportion_interval(*one.good)
-            if low > surest:
-                surest, best = low, one
-        return best
+        surest = {
+            one.pupil.number: proportion_interval(*one.good)[1]
+            for one in self.taught
+            if one.row is not None and one.dropped_at is None and one.good is not None
+        }
+        best = max(surest.values(), default=0.0)
+        return [one for one in self.taught if best > 0.0 and surest.get(one.pupil.number) == best]
 
 
 def class_record(roster: Roster) -> list[LessonRecord]:

@@ -107,13 +107,14 @@ def receipt_lines(one: TaughtLesson) -> list[tuple[int, str]]:
 
 
 def why_best(record: LessonRecord) -> str:
-    """Who was the best teacher of a lesson, and by which share of good advice, in words; "" for nobody."""
-    best = record.best_teacher
-    if best is None or best.worth is None:
+    """Who was the best teacher of a lesson, or several, and by which share of good advice, in words; "" for nobody."""
+    best = record.best_teachers
+    if not best or best[0].worth is None:
         return ""
-    if best.worth.against_best is None:
-        return f"{best.pupil.name}: {better_episodes(best)} advised episodes were better than before, or as good as the best"
-    return f"{best.pupil.name}: {best_answers(best)} answers were best"
+    names = ", ".join(one.pupil.name for one in best)
+    if best[0].worth.against_best is None:
+        return f"{names}: {better_episodes(best[0])} advised episodes were better than before, or as good as the best"
+    return f"{names}: {best_answers(best[0])} answers were best"
 
 
 def number(value: Number) -> str:
@@ -127,11 +128,11 @@ def cost(record: LessonRecord, value: Number) -> str:
 
 
 def class_chart(record: LessonRecord) -> Chart | None:
-    """The curves of all pupils in one picture, the best teacher's last, and their median."""
-    best = record.best_teacher
-    drawn = [one for one in record.taught if one is not best] + ([] if best is None else [best])
+    """The curves of all pupils in one picture, the best teachers' last, and their median."""
+    best = record.best_teachers
+    drawn = [one for one in record.taught if one not in best] + best
     curves: list[tuple[Kind, str, Curve]] = [
-        ("best" if one is best else _kind(one), one.pupil.name, record.curve(one)) for one in drawn
+        ("best" if one in best else _kind(one), one.pupil.name, record.curve(one)) for one in drawn
     ]
     return chart_of(curves, record.optimum, record.middle, from_zero=not record.about_order)
 

@@ -5,6 +5,7 @@ from typing import Any
 
 from lab.advice.advising import Advising
 from lab.advice.entries import FILE, is_unbegun
+from lab.errors import BadInput
 from lab.files import is_file
 from lab.production.order_session import sequenced
 from lab.seat.lesson_seat import LessonSeat
@@ -35,7 +36,9 @@ def order_lesson(options: OrderSessionOptions, folder: Path, toolbox: Toolbox, s
 def _kept(options: OrderSessionOptions, folder: Path, toolbox: Toolbox) -> OrderSession:
     path = folder / FILE
     if is_file(path) and not is_unbegun(path):
-        read, options = read_session(folder, "lab class --resume", OrderSessionOptions)
-        return OrderSession(options, toolbox, read, read_only=read.closed is not None)
+        read, begun = read_session(folder, "lab class --resume", OrderSessionOptions)
+        if begun.to_json() != options.to_json():  # a folder may come from somebody else: the class says what is done
+            raise BadInput(f"journal '{path}' (lab class --resume): it is of another lesson than the class has there")
+        return OrderSession(begun, toolbox, read, read_only=read.closed is not None)
     check_new(folder)
     return OrderSession(options, toolbox, out=folder)

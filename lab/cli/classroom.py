@@ -153,6 +153,8 @@ def _new(
     if out is None:
         raise BadInput("--out is missing: the folder in which the class is kept, such as --out monday")
     task, learner, gate, episodes = options
+    if learner is not None and all(lesson.startswith(deferred.ORDER_LESSON) for lesson in lessons):
+        raise BadInput(f"--learner {learner}: lessons on an order are learned by srl, and there is no other: remove it")
     wanted: list[deferred.ClassLesson] = []
     for lesson in lessons:
         if lesson.startswith(deferred.ORDER_LESSON):

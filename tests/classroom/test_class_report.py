@@ -12,7 +12,7 @@ import pytest
 from lab.advice.advising import Advising
 from lab.advice.entries import FILE
 from lab.classroom.class_lesson import ClassLesson, order_lesson_named
-from lab.classroom.class_record import LessonRecord, class_record
+from lab.classroom.class_record import LessonRecord, TaughtLesson, class_record
 from lab.classroom.class_report import page_now, write_report
 from lab.classroom.kept_lesson import KEPT
 from lab.classroom.roster import Pupil, Roster
@@ -120,12 +120,31 @@ def test_the_folder_tells_what_was_taught(roster: Roster) -> None:
     assert (names[4].row, names[4].curve) == (None, ())
     assert (names[5].row, names[5].worth) == (None, None)
     assert names[5].trouble
-    assert world.best_teacher is names[1]
+    assert world.best_teachers == [names[1]]
     assert (world.optimum, order.optimum is not None) == (2, True)
     assert [one.pupil.number for one in order.taught] == [1]
     assert order.taught[0].moves
     least = [value for value, _ in order.taught[0].best_so_far]
     assert least == sorted(least, reverse=True)
+
+
+def test_the_best_teachers_are_good_most_surely_and_equals_are_named_together(roster: Roster) -> None:
+    good = record_of(roster)[0].best_teachers[0]
+    assert good.worth is not None
+
+    def with_answers(number: int, taken: int, wrong: int) -> TaughtLesson:
+        assert good.worth is not None
+        worth = replace(good.worth, taken=taken, against_best=wrong)
+        return replace(good, pupil=replace(good.pupil, number=number), worth=worth)
+
+    few, as_few, many, dropped = (
+        *(with_answers(1, 6, 0), with_answers(2, 6, 0), with_answers(3, 60, 1)),
+        replace(with_answers(4, 99, 0), dropped_at=9),
+    )
+    open_still, silent = replace(with_answers(5, 99, 0), row=None), with_answers(6, 0, 0)
+    others = [few, as_few, dropped, open_still, silent]
+    assert LessonRecord(0, "world", False, others).best_teachers == [few, as_few]
+    assert LessonRecord(0, "world", False, [*others, many]).best_teachers == [many]
 
 
 def test_a_class_has_a_report_and_a_page_for_each_pupil(roster: Roster) -> None:

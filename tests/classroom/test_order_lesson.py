@@ -16,14 +16,18 @@ from lab.advice.advising import Advising
 from lab.classroom.class_lesson import ADVISORS, check_lesson, lesson_to_json, order_lesson_named, title_of
 from lab.classroom.desk import Desk, processes
 from lab.classroom.desk_process import DeskOrder
+from lab.classroom.order_lesson import order_lesson
 from lab.classroom.roster import FILE, Pupil, Roster
 from lab.classroom.tile import best_first, row_of
 from lab.errors import BadInput
 from lab.production.order_session import sequenced
+from lab.seat.lesson_seat import LessonSeat
+from lab.seat.run_progress import RunProgress
 from lab.teaching.kept_order import OrderSession, OrderSessionOptions
 from lab.teaching.lesson_options import LessonOptions
 from lab.teaching.teacher import Teacher
 from lab.toolbox.registry import Toolbox
+from lab.view.progress import EscapingConsole
 from tests.classroom.conftest import answer, seated, until
 
 ORDER = replace(order_lesson_named("order:toast-case-1", "always", 2, 0), toasts=2)
@@ -95,6 +99,14 @@ def test_an_order_at_a_desk_is_the_order_alone_also_after_the_desk_was_killed(tm
         return opened
 
     assert asyncio.run(again()).result == desk.result
+
+
+def test_a_journal_of_another_lesson_is_refused(tmp_path: Path) -> None:
+    alone(tmp_path / "alone")
+    seat, box = LessonSeat(RunProgress(EscapingConsole(quiet=True)), None, None), Toolbox(str(tmp_path / "box"))
+    for changed in ({"episodes": 3}, {"advisor": "none", "method": "srl-linear", "keep_policy": "mine"}):
+        with pytest.raises(BadInput, match="another lesson"):
+            order_lesson(replace(ORDER, **changed), tmp_path / "alone", box, seat)
 
 
 def test_the_row_of_an_order_has_its_cost_and_the_optimum(tmp_path: Path) -> None:

@@ -30,6 +30,7 @@ EXAMPLE = Path(__file__).parents[2] / "examples" / "study_with_people.toml"
         (["world-1", "--out", "x", "--pupils", "0"], "--pupils"),
         (["world-1", "--out", "x", "--gate", "ccr"], "ccr"),
         (["order:nothing", "--out", "x"], "nothing"),
+        (["order:toast-case-1", "--out", "x", "--learner", "sarsa"], "--learner sarsa"),
         (["order:", "--out", "x"], "nothing to sequence"),
         (["order:world-1", "--out", "x"], "nothing to sequence"),
         (["world-1", "order:toast-case-1", "--out", "x", "--gate", "ia"], "'ia' (--gate)"),
