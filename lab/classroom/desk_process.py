@@ -16,7 +16,7 @@ from typing import Any
 
 from lab.advice.advisors import PAGE_OF
 from lab.advice.answer_times import AnswerTimes
-from lab.advice.entries import FILE, is_unbegun
+from lab.advice.entries import FILE, is_unbegun, read_journal
 from lab.classroom.class_lesson import ClassLesson
 from lab.classroom.order_lesson import order_lesson
 from lab.errors import LabError
@@ -37,6 +37,7 @@ from lab.teaching.teacher import Teacher
 from lab.toolbox.registry import Toolbox
 from lab.view.progress import EscapingConsole
 
+RESUMED = "lab class --resume"  # where a journal is named, for errors
 LAST_S = 10.0  # time for a lesson to end after its pipe has closed
 
 
@@ -90,7 +91,7 @@ def _people(order: DeskOrder) -> list[str]:
     begun = order.folder / FILE
     if not (order.people and is_file(begun)) or is_unbegun(begun):
         return [*order.people]
-    _, options = read_session(order.folder, "lab class --resume", LessonOptions)
+    _, options = read_session(order.folder, RESUMED, LessonOptions)
     return [name.removeprefix(PAGE_OF) for name in options.advisor_names]
 
 
@@ -125,9 +126,11 @@ def _lesson(order: DeskOrder, pages: Mapping[str, SeatPage]) -> Mapping[str, Any
 
 
 def _table_lesson(order: DeskOrder, options: LessonOptions, toolbox: Toolbox, seat: LessonSeat) -> Mapping[str, Any]:
+    """The document of `lab teach --json`; a lesson that is over, whose document was lost, is run again from its journal."""
     kept = None
     if is_file(order.folder / FILE):
-        kept = KeptSession(order.folder, "lab class --resume", trusted=order.modules)
+        is_over = not is_unbegun(order.folder / FILE) and read_journal(order.folder, RESUMED).closed is not None
+        kept = KeptSession(order.folder, RESUMED, read_only=is_over, trusted=order.modules)
         options = kept.options
     else:
         check_new(order.folder)

@@ -221,6 +221,21 @@ def test_a_finished_lesson_is_a_row_of_the_table_and_is_shown_again(server: Clas
         assert again.call(lambda: [row["state"] for row in again.room.rows()]) == ["over"]
 
 
+def test_a_lesson_that_ended_as_its_desk_was_killed_is_made_again_from_its_journal(server: ClassServer) -> None:
+    page = join(server)["page"]
+    at_page(server, page, taught)
+    at_page(server, teacher(server), lambda opened: until(opened, lambda news: news.get("rows")))
+    before = server.call(server.room.rows)
+    journal = server.room.folder(server.roster.pupils[0], 0) / "events.jsonl"
+    written = journal.read_bytes()
+    server.stop()
+    (journal.parent / "lesson.json").unlink()
+    with ClassServer(Roster.read(server.roster.folder), Place()) as again:
+        at_page(again, teacher(again), lambda opened: until(opened, lambda news: news.get("rows")))
+        assert again.call(again.room.rows) == before
+    assert journal.read_bytes() == written
+
+
 def test_a_pupil_gets_the_seat_back_when_help_ends_also_after_the_helping_page_was_closed(
     tmp_path: Path, lesson: LessonOptions
 ) -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from lab.classroom.class_lesson import name_of
 from lab.classroom.study import Study
 from lab.classroom.study_protocol import PlannedStep, StudyProtocol
 from lab.errors import BadInput
@@ -29,8 +30,8 @@ def test_the_steps_of_an_order() -> None:
 
 def test_the_lessons_are_those_of_the_arms_with_their_options(tmp_path: Path) -> None:
     lessons = study_in(tmp_path, **{'advisor = "praise:web"': 'advisor = "praise:web"\nseed = 3'}).roster.lessons
-    assert [lesson.subtask for lesson in lessons] == [str(tmp_path / "small.txt")] * 3
-    assert [lesson.advisors for lesson in lessons] == [("web",), ("praise:web",), ("web",)]
+    assert [name_of(lesson) for lesson in lessons] == [str(tmp_path / "small.txt")] * 3
+    assert [lesson.advisor_names for lesson in lessons] == [("web",), ("praise:web",), ("web",)]
     assert [lesson.seed for lesson in lessons] == [7, 3, 7]
     assert [lesson.episodes for lesson in lessons] == [2, 2, 2]
 
