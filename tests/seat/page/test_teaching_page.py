@@ -161,7 +161,8 @@ def test_the_means_of_an_answer_are_known(
         assert page.asking.latency_s is not None
         for later in means[1:]:
             page.ask(replace(request_1, state=1, step=2))
-            assert (page.asking.means, page.asking.shown, page.asking.latency_s) == (later, None, None)
+            now = page.asking
+            assert (now.means, now.shown, now.latency_s) == (later, None, None)
 
 
 @pytest.mark.parametrize(("word", "value"), [("+", 1), ("-", -1)])
