@@ -11,7 +11,7 @@ import ssl
 import threading
 import time
 from asyncio.sslproto import SSLProtocol
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -23,10 +23,11 @@ from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import HTTPConnection, Request
 from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
-from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
+from starlette.websockets import WebSocket, WebSocketDisconnect
 from uvicorn import Server as Uvicorn
 from websockets.exceptions import ConnectionClosed
 
+from lab.classroom.browser_socket import closer, sender, text_of
 from lab.classroom.certificate import fingerprint, made_certificate
 from lab.classroom.class_place import Place, files_of
 from lab.classroom.code_picture import code_svg
@@ -48,7 +49,6 @@ MOST_TEACHERS = 8  # open pages of the teacher
 MOST_LOOKERS = 64  # pages that look over a shoulder
 TLS_BYTES = 1 << 14  # read at once from a connection; asyncio would keep 256 KB for each, also before hands are shaken
 MOST_OPENED, OPENED_S = 20, 10.0  # pages that a pupil may open in so many seconds
-REASONS = {OVER: "the class has ended", REMOVED: "your teacher has closed this seat"}
 FREE = '"free": true'  # in a message about the seat
 
 
@@ -371,32 +371,3 @@ class ClassServer:
                     raise BadInput("that was no message of this page")
         except (BadInput, ValueError, RecursionError) as error:
             await sender(browser)(json.dumps({"refusal": str(error)}))
-
-
-def sender(browser: WebSocket) -> Callable[[str | bytes], Awaitable[None]]:
-    """A function that sends text to a browser, and does nothing once that has left."""
-
-    async def send(text: str | bytes) -> None:
-        with suppress(WebSocketDisconnect, RuntimeError):
-            await browser.send_text(text if isinstance(text, str) else text.decode())
-
-    return send
-
-
-async def text_of(browser: WebSocket) -> str:
-    """The next message of a browser; "" for one that is no text. Raises WebSocketDisconnect."""
-    message = await browser.receive()
-    if message["type"] == "websocket.disconnect":
-        raise WebSocketDisconnect(message.get("code", 1005))
-    return str(message.get("text") or "")
-
-
-def closer(browser: WebSocket) -> Callable[[int], Awaitable[None]]:
-    """A function that closes a browser's connection with a code."""
-
-    async def close(code: int) -> None:
-        with suppress(WebSocketDisconnect, RuntimeError):
-            if browser.application_state is WebSocketState.CONNECTED:
-                await browser.close(OVER if code in REASONS else code, REASONS.get(code))
-
-    return close
