@@ -14,7 +14,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from itertools import product
+from itertools import chain, count, product
 from pathlib import Path
 from typing import Any
 
@@ -99,8 +99,14 @@ class ClassAttack(Attack):
         self.tries += 1
         address = f"{self.scheme.replace('http', 'ws')}://{self.here}{path or self.own}"
         try:
-            more = {"ssl": self.tls} if self.target.secured else {}
-            return connect(address, max_size=None, open_timeout=ANSWER_S, close_timeout=0.1, proxy=None, **more)
+            return connect(
+                address,
+                ssl=self.tls if self.target.secured else None,
+                max_size=None,
+                open_timeout=ANSWER_S,
+                close_timeout=0.1,
+                proxy=None,
+            )
         except Exception:
             return None
 
@@ -140,21 +146,20 @@ def frame(content: bytes, kind: int, last: bool = True) -> bytes:
 
 def requests(attack: ClassAttack) -> None:
     """Send requests of every kind without a right: paths, methods, tokens, hosts and origins."""
+    endless = chain.from_iterable(cases(attack) for _ in count())
     while attack.goes_on:
-        for method, path, token, host, origin in cases(attack):
-            if not attack.goes_on:
-                return
-            shown = path if token is None else f"{path}?token={token}&pupil=1"
-            words = f"{method} {shown} HTTP/1.1\r\n" + (f"Host: {host}\r\n" if host else "")
-            words += (UPGRADE if origin is not None else "") + (f"Origin: {origin}\r\n" if origin else "")
-            answer = attack.looked_at(attack.asked((words + "\r\n").encode("latin-1")), f"{method} {path}")
-            case = f"{method} {path} token {token!r} host {host!r} origin {origin!r}"
-            if answer[9:12] == b"101" or (answer[9:12] == b"200" and "class.csv" in path):
-                attack.get_in(f"{case}: {answer[9:12].decode()}")
-            if answer[9:12] == b"200" and host.rpartition(":")[0] not in (attack.host, "localhost"):
-                attack.get_in(f"{case}: {answer[9:12].decode()}")
-            if answer == b"no answer" or answer[9:10] == b"5":
-                attack.get_in(f"{case}: {answer[:20]!r}")
+        method, path, token, host, origin = next(endless)
+        shown = path if token is None else f"{path}?token={token}&pupil=1"
+        words = f"{method} {shown} HTTP/1.1\r\n" + (f"Host: {host}\r\n" if host else "")
+        words += (UPGRADE if origin is not None else "") + (f"Origin: {origin}\r\n" if origin else "")
+        answer = attack.looked_at(attack.asked((words + "\r\n").encode("latin-1")), f"{method} {path}")
+        case = f"{method} {path} token {token!r} host {host!r} origin {origin!r}"
+        if answer[9:12] == b"101" or (answer[9:12] == b"200" and "class.csv" in path):
+            attack.get_in(f"{case}: {answer[9:12].decode()}")
+        if answer[9:12] == b"200" and host.rpartition(":")[0] not in (attack.host, "localhost"):
+            attack.get_in(f"{case}: {answer[9:12].decode()}")
+        if answer == b"no answer" or answer[9:10] == b"5":
+            attack.get_in(f"{case}: {answer[:20]!r}")
 
 
 def cases(attack: ClassAttack) -> Iterator[tuple[str, str, str | None, str, str | None]]:
@@ -521,7 +526,9 @@ def neighbours(attack: ClassAttack) -> None:
 
 def sentences(attack: ClassAttack) -> None:
     """Say sentences with markup, and answer and take back as fast as possible, so that the journal grows."""
-    page, known, turn = None, {}, 0
+    page: Any = None
+    known: dict[str, Any] = {}
+    turn = 0
     while attack.goes_on:
         if page is None:
             page = attack.page()

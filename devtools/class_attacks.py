@@ -84,8 +84,7 @@ class Running:
         """An open websocket."""
         from websockets.sync.client import connect
 
-        more = {} if self.tls is None else {"ssl": self.tls}
-        return connect(self.sockets + address, max_size=None, open_timeout=WAIT_S, proxy=None, **more)
+        return connect(self.sockets + address, ssl=self.tls, max_size=None, open_timeout=WAIT_S, proxy=None)
 
 
 def taught(folder: Path, secured: bool, attacked: Callable[[Running], Any], sweeps: bool = False) -> Taught:

@@ -1,4 +1,4 @@
-"""What a class's server does with a browser's websocket: send to it, and close it, also when the browser has left."""
+"""The websocket of a browser: its next message, and functions that send to it and close it, also when it has left."""
 
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
