@@ -43,7 +43,10 @@ ALONE: dict[str, set[str]] = (
         "PIL": {"lab.view.movie"},
         "numba": {"lab.learning.compiled"},  # what is kept of it is kept in one place
         "ortools": {"lab.sequencing.methods.cp_sat_solver"},  # without pandas
-        "starlette": {"lab.view.server", "lab.view.server_page", "lab.classroom.class_server"},
+        "starlette": {
+            *("lab.view.server", "lab.view.server_page"),
+            *("lab.classroom.class_server", "lab.classroom.door", "lab.classroom.browser_socket"),
+        },
         "uvicorn": {"lab.view.server", "lab.view.server_page", "lab.classroom.class_server"},
         "websockets": {"lab.classroom.class_server", "lab.classroom.desk"},
         "segno": {"lab.classroom.code_picture"},
