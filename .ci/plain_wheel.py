@@ -27,6 +27,8 @@ if __name__ == "__main__":
         sys.exit(subprocess.run([sys.executable, *sys.argv[1:], "--dask", cluster.scheduler_address]).returncode)
 """
 
+CLASS = json.dumps({"format": "teaching-lab class 1", "lessons": [], "pupils": [{"number": 1, "name": "red owl"}]})
+
 
 class Place:
     """An empty folder with a home, a toolbox and caches of its own, in which an environment's commands are run."""
@@ -158,6 +160,13 @@ def refused(place: Place) -> None:
     place.run(*dask, code=WRONG_INPUT, said=install.format("dask"))
     place.run("replay", "kept", "--minari", "lab/kept-v0", code=WRONG_INPUT, said=install.format("data"))
     place.run("replay", "kept", "--tensorboard", "curves", code=WRONG_INPUT, said=install.format("data"))
+    made = ("study", "export", "class", "--out", "tables")
+    place.run(*made, "--parquet", code=WRONG_INPUT, said=install.format("people"))
+    (place.work / "class").mkdir()
+    (place.work / "class" / "class.json").write_text(CLASS)
+    place.run(*made)
+    arms_compared(place, code=WRONG_INPUT, said=install.format("people"))
+    arms_compared(place, "--no-model")
 
 
 def with_tune(place: Place) -> None:
@@ -189,7 +198,33 @@ def with_data(place: Place) -> None:
     place.called(["-c", "import lab; print(lab.teach('small.txt', episodes=20).to_dataframe())"], "to_dataframe()")
 
 
-EXTRAS = {"dask": with_dask, "data": with_data, "remote": with_remote, "tune": with_tune}  # each but docs, test and dev
+def with_people(place: Place) -> None:
+    (place.work / "class").mkdir()
+    (place.work / "class" / "class.json").write_text(CLASS)
+    place.run("study", "export", "class", "--out", "tables", "--parquet")
+    arms_compared(place)
+
+
+def arms_compared(place: Place, *options: str, **wanted: Any) -> None:
+    """The arms of a study with four participants, in tables that are written here, are compared."""
+    tables = place.work / "arms"
+    tables.mkdir(exist_ok=True)
+    (tables / "export.json").write_text('{"format": "teaching-lab export 1", "class": "arms"}')
+    (tables / "dictionary.csv").write_text(
+        "table,name,type,unit,meaning,allowed\nparticipants,lesson,integer,,,\nparticipants,seconds,number,s,,\n"
+    )
+    rows = [f"p{n},{arm},{1 + (arm == 'b')},{9 * n + n % 3 + (arm == 'b')}" for n in range(4) for arm in "ab"]
+    (tables / "participants.csv").write_text("\n".join(["participant,arm,lesson,seconds", *rows, ""]))
+    place.run("study", "people", "arms", "--out", "compared", *options, **wanted)
+
+
+EXTRAS = {
+    "dask": with_dask,
+    "data": with_data,
+    "people": with_people,
+    "remote": with_remote,
+    "tune": with_tune,
+}  # each but docs, test and dev
 
 
 def main() -> int:

@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from devtools.audits import PART as AUDITS
+from devtools.class_attacks import PART as CLASS
 from devtools.ctrl_c import PART as CTRL_C
 from devtools.drawn_physics import PART as PHYSICS
 from devtools.kills import PART as KILLS
@@ -31,6 +32,7 @@ PARTS: dict[str, Part] = {
     "mutated-commands": MUTATED_COMMANDS,
     "sizes": SIZES,
     "requests": REQUESTS,
+    "class": CLASS,
     "resources": RESOURCES,
     "physics": PHYSICS,
     "audits": AUDITS,

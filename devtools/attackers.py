@@ -24,6 +24,8 @@ AT_ONCE = 400  # connections that an attacker holds
 class Attack:
     """One attacker. token: for attacks with it, and to check that nobody gets in without it; server: the lesson's process."""
 
+    host = HOST
+
     def __init__(self, port: int, token: str, seconds: float, seed: int, server: int) -> None:
         self.port, self.token, self.server = port, token, server
         self.until_s = time.monotonic() + seconds
@@ -40,7 +42,7 @@ class Attack:
         """A connection, or None when the server accepts none."""
         self.tries += 1
         try:
-            return socket.create_connection((HOST, self.port), timeout=ANSWER_S)
+            return socket.create_connection((self.host, self.port), timeout=ANSWER_S)
         except OSError:
             return None
 
@@ -124,7 +126,7 @@ def flood(attack: Attack, words: bytes = b"", again: bytes = b"") -> None:
     while attack.goes_on:
         opened = socket.socket()
         opened.setblocking(False)
-        opened.connect_ex((HOST, attack.port))
+        opened.connect_ex((attack.host, attack.port))
         attack.tries += 1
         held.append((opened, chain([words], repeat(again))))
         other, says = held[attack.chance.randrange(len(held))]

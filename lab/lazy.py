@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     import prompt_toolkit.output.vt100
     import prompt_toolkit.utils
     import psutil
+    import pyarrow.parquet
     import pydantic
     import rich.console
     import rich.padding
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
     import rich.table
     import rich.text
     import scipy
+    import statsmodels.regression.mixed_linear_model
     import tensorboard.compat.proto.event_pb2
     import tensorboard.compat.proto.summary_pb2
     import tensorboard.summary.writer.event_file_writer
@@ -91,9 +93,11 @@ LIBRARIES: Mapping[str, Sequence[str]] = {
         "prompt_toolkit.utils",
     ),
     "psutil": ("psutil",),
+    "pyarrow": ("pyarrow.parquet",),
     "pydantic": ("pydantic",),
     "rich": ("rich.console", "rich.padding", "rich.panel", "rich.table", "rich.text"),
     "scipy": ("scipy",),
+    "statsmodels": ("statsmodels.regression.mixed_linear_model",),
     "tensorboard": (
         "tensorboard.compat.proto.event_pb2",
         "tensorboard.compat.proto.summary_pb2",

@@ -11,6 +11,7 @@ EXTRAS = {  # extra in pyproject.toml -> the optional libraries that it installs
     "dask": ("distributed",),
     "data": ("h5py", "minari", "pandas", "tensorboard"),
     "deep": ("torch",),
+    "people": ("pyarrow", "statsmodels"),
     "remote": ("fsspec", "s3fs"),
     "tune": ("optuna",),
 }

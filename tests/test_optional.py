@@ -117,6 +117,7 @@ TABLE = "import lab; lab.teach('world-1', advisor=None, episodes=2).{}"
         ("minari", (*REPLAY, "--minari", "lab/kept-v0"), "dataset 'lab/kept-v0': {} '.[data]' {}"),
         ("h5py", (*REPLAY, "--minari", "lab/kept-v0"), "dataset 'lab/kept-v0': {} '.[data]' {}"),
         ("tensorboard", (*REPLAY, "--tensorboard", "curves"), "folder 'curves': {} '.[data]' {}"),
+        ("pyarrow", ("study", "export", "nowhere", "--out", "x", "--parquet"), "--parquet: {} '.[people]' {}"),
     ],
 )
 def test_a_command_says_what_to_install(

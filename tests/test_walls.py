@@ -43,12 +43,22 @@ ALONE: dict[str, set[str]] = (
         "PIL": {"lab.view.movie"},
         "numba": {"lab.learning.compiled"},  # what is kept of it is kept in one place
         "ortools": {"lab.sequencing.methods.cp_sat_solver"},  # without pandas
-        "starlette": {"lab.view.server", "lab.view.server_page", "lab.classroom.class_server"},
+        "starlette": {
+            "lab.view.server",
+            "lab.view.server_page",
+            "lab.view.polled_pages",
+            "lab.classroom.class_server",
+            "lab.classroom.browser_socket",
+            "lab.classroom.door",
+            "lab.classroom.step_pages",
+        },
         "uvicorn": {"lab.view.server", "lab.view.server_page", "lab.classroom.class_server"},
         "websockets": {"lab.classroom.class_server", "lab.classroom.desk"},
         "segno": {"lab.classroom.code_picture"},
         "cryptography": {"lab.classroom.certificate"},
-        "jinja2": {"lab.studies.report"},
+        "jinja2": {"lab.studies.report", "lab.studies.people_report", "lab.classroom.class_report"},
+        "pyarrow": {"lab.classroom.export"},
+        "statsmodels": {"lab.studies.people"},
         "lark": {"lab.words.slots"},
         "fsspec": {"lab.toolbox.remote_place"},
         "s3fs": set(),  # fsspec's
@@ -80,9 +90,11 @@ HEAVY = (
 READS_ITS_OWN = (  # what ships with the lab, or what it has just written: nothing that a stranger may have made
     *(
         "lab.classroom.class_place",
+        "lab.classroom.class_report",
         "lab.view.meshcat",
         "lab.view.server_page",
         "lab.studies.report",
+        "lab.studies.people_report",
         "lab.cli.export",
         "lab.toolbox.remote_place",
     ),
@@ -331,7 +343,7 @@ def faults(module: str, source: str) -> list[str]:
             "from ortools.sat.python import cp_model",
             "allowed in ['lab.sequencing.methods.cp_sat_solver']",
         ),
-        ("lab.sequencing.methods.fifo", "def f():\n    import jinja2", "allowed in ['lab.studies.report']"),
+        ("lab.sequencing.methods.fifo", "def f():\n    import jinja2", "imports jinja2: allowed in"),
         ("lab.mdp", "import random", "allowed in no module"),
         ("lab.files", "def f():\n    import fcntl", "allowed in ['lab.operating_system']"),
         ("lab.toolbox.registry", "import pickle", "allowed in no module"),

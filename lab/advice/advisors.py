@@ -65,7 +65,8 @@ class Level(Protocol):
 class AdvisorName:
     """A parsed advisor name.
 
-    text: as it was typed; row: the key in ADVISORS; taus, folder, policy, answers, accuracy, model: the parameters in the name.
+    text: as it was typed; row: the key in ADVISORS; taus, folder, policy, answers, accuracy, model, person: the parameters in the
+    name.
     itself: an advisor made in Python, or its class, which is in no table.
     inner, judging: by whom and how moves are judged, of a name such as "praise:expert", which has the parameters of `inner`, too.
     """
@@ -79,6 +80,7 @@ class AdvisorName:
     itself: "Advisor | Ask | type[Advisor] | None" = None
     accuracy: float = 0.0
     model: ModelAddress | None = None
+    person: str = ""
     inner: "AdvisorName | None" = None
     judging: Judging | None = None
 
@@ -226,7 +228,8 @@ def _of_accuracy(name: AdvisorName, level: Level) -> "Advisor":
 
 def _person(name: AdvisorName, level: Level) -> "Advisor":
     if name.text not in level.people:
-        raise BadInput(f"advisor '{name}': this command has no {PEOPLE[name.text]} to ask a person through")
+        what = f"page for '{name.person}'" if name.person else f"{PEOPLE[name.text]} to ask a person through"
+        raise BadInput(f"advisor '{name}': this command has no {what}")
     return Person(level.people[name.text], Judging())
 
 
@@ -283,11 +286,21 @@ def _learned(name: AdvisorName, level: Level) -> "Advisor":
         raise BadInput(f"advisor '{name}': {error}") from None
 
 
+def _person_name(text: str) -> str:
+    """The name of a person. Raises BadInput for one that is long, or not of letters, digits, spaces and hyphens."""
+    if len(text) > MOST_NAME or not re.fullmatch(r"[^\W_]+(?:[ -][^\W_]+)*", text):
+        raise BadInput(
+            f"name '{shortened(text)}': wanted at most {MOST_NAME} letters, digits, single spaces and hyphens"
+        )
+    return text
+
+
 # prefix -> row, field of AdvisorName, the type of that field, the error text if it is empty
 PREFIXED: dict[str, tuple[str, str, Callable[[str], Any], str]] = {
     "recorded": ("recorded:DIR", "folder", Path, "no file: wanted recorded:DIR, the folder of a session"),
     "answers": ("answers:FILE", "answers", Path, "no file: wanted answers:FILE, see docs/teaching.md"),
     "policy": ("policy:NAME", "policy", str, "no policy: wanted policy:NAME; see lab toolbox list"),
+    "web": ("web:PERSON", "person", _person_name, "nobody: wanted web:PERSON, one of several people with a page each"),
     "llm": ("llm:URL", "model", ModelAddress.of, f"no server: wanted {MODEL_WANTED}"),
 }
 PRAISE, PRAISE_ROW = "praise", "praise:WHO"
@@ -296,7 +309,13 @@ NO_EVALUATORS = ("none", "llm:URL", PRAISE_ROW)  # the rows of those who cannot 
 PYTHON = "python"  # the row of an advisor that is in no table
 PEOPLE = {"terminal": "prompt", "web": "page"}
 MODEL = "llm:"  # begins the name of a language model
-EXTERNAL = (*PEOPLE, "llm:URL")  # the rows of those whose answers nothing can compute again: a journal holds them
+PAGE_OF = "web:"  # begins the name of one of several people with a page each
+MOST_NAME = 40  # characters of a person's name
+EXTERNAL = (
+    *PEOPLE,
+    "web:PERSON",
+    "llm:URL",
+)  # the rows of those whose answers nothing can compute again: a journal holds them
 SKILL_TAUS = {"expert": 0.01, "moderate": 0.1, "limited": 0.3, "novice": 1.0}
 
 
@@ -343,6 +362,7 @@ _SHIPPED: dict[str, AdvisorKind] = {
     "answers:FILE": AdvisorKind(_answers, 'answers kept as JSON, {"state": "action"}'),
     "policy:NAME": AdvisorKind(_learned, "a policy in the toolbox, or its file"),
     "llm:URL": AdvisorKind(_language_model, "a language model behind a server with chat completions"),
+    "web:PERSON": AdvisorKind(_person, "one of several people, who have a page each"),
     PRAISE_ROW: AdvisorKind(_evaluator, "praises and blames moves as one of these would, WHO, or a person"),
 }
 ADVISORS = Family("advisors", _SHIPPED, _adopted)
@@ -350,7 +370,12 @@ ADVISORS = Family("advisors", _SHIPPED, _adopted)
 
 def is_external(name: str) -> bool:
     """Whether an advisor of this name asks one of EXTERNAL: a person, also one who only judges, or a language model."""
-    return split_praise(name)[0] in PEOPLE or name.startswith(MODEL)
+    return split_praise(name)[0] in PEOPLE or name.startswith((MODEL, PAGE_OF))
+
+
+def shown_name(name: str) -> str:
+    """An advisor's name for people: of one of several people, the person's."""
+    return name.removeprefix(PAGE_OF)
 
 
 def named() -> list[str]:

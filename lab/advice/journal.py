@@ -46,12 +46,14 @@ class Journal:
     path: of the file, None if nothing is written (answers can be taken back all the same).
     entries: those that count.
     read_only: a replay, which stops the session at the last entry; found: the file that is replayed.
+    lines: of the file so far, its head and the answers that were taken back among them.
     """
 
     path: Path | None = None
     entries: list[Entry] = field(default_factory=list)
     read_only: bool = False
     found: Path | None = None
+    lines: int = 0
     _at: int = 0
     _file: AppendedFile | None = None
     _unsafe: bool = False  # an answer may not be on the disk yet
@@ -98,7 +100,7 @@ class Journal:
         except BadInput:
             journal.close()
             raise
-        journal.entries = now.effective()
+        journal.entries, journal.lines = now.effective(), 1 + len(now.entries)
         return journal
 
     @property
@@ -149,7 +151,8 @@ class Journal:
         """A person's answer to a request: the recorded one, or one asked for now and written before it is used.
 
         An `ask` with the methods `holding` and `recall` has what its person has said and what holds from then on recorded with
-        the answers, and is told it in a replay.
+        the answers, and is told it in a replay. The method `written`, where there is one, is called with this journal once the
+        answer is in it, or that the last one is taken back.
         Raises AdvisorLeft, and Again if the person took the last answer of the episode back.
         """
         if self.folding:
@@ -168,6 +171,7 @@ class Journal:
         given = self._asked(by, request, ask)
         self._append(given)
         self._unsafe = True
+        _tell_written(ask, self)
         return _answered(given)
 
     def _asked(self, by: str, request: Request, ask: Ask) -> Answer | Praise:
@@ -188,6 +192,7 @@ class Journal:
                     continue
                 self._write(Undone(by, request.episode))
                 del self.entries[last:]
+                _tell_written(ask, self)
                 raise Again from None
 
     def _recall(self, by: str, request: Request, ask: Ask, holds: tuple[dict[str, Any], ...] | None) -> None:
@@ -212,6 +217,7 @@ class Journal:
         self._at = len(self.entries)
 
     def _write(self, entry: Entry) -> None:
+        self.lines += 1
         if self._file is None:
             return
         self._file.write(line_of(entry))
@@ -224,6 +230,11 @@ class Journal:
         if self._file is not None:
             self._file.close()
             self._file = None
+
+
+def _tell_written(ask: Ask, journal: Journal) -> None:
+    if (written := getattr(ask, "written", None)) is not None:
+        written(journal)
 
 
 def _answered(given: Answer | Praise) -> Reply:

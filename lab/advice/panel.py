@@ -236,6 +236,10 @@ class Panel:
             member.forget()
         member.dropped = not member.dropped
 
+    def heard(self) -> list[str]:
+        """The names of the members to whom the next question goes for sure: of those asked in turn, none."""
+        return [] if self._in_turn else [name for name, member in self._members.items() if not member.dropped]
+
     def standing(self) -> list[MemberStanding]:
         """The standing of the members that have not left, in their original order."""
         return [

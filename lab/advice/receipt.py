@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from lab.advice.advisors import MODEL
+from lab.advice.advisors import MODEL, shown_name
 from lab.advice.entries import Answer, Entry, Praise
 from lab.advice.trust import Difference, Pair, SkillEstimate, differences, skill_of, worse
 from lab.errors import counted
@@ -317,7 +317,7 @@ def _notices(entries: Sequence[Entry]) -> Iterator[str]:
             yield f"episode {entry.episode}: {entry.by} left: {entry.why}"
         elif isinstance(entry, AdvisorDropped | AdvisorReadmitted):
             what = "dropped" if isinstance(entry, AdvisorDropped) else "heard again"
-            yield f"episode {entry.episode}: {entry.advisor} {what}: {entry.why}"
+            yield f"episode {entry.episode}: {shown_name(entry.advisor)} {what}: {entry.why}"
 
 
 def _hints(of: Receipt, entries: Sequence[Entry], window: int) -> Iterator[str]:
@@ -391,6 +391,6 @@ def _lines(of: Receipt) -> Iterator[str]:
         against = "" if voice.against_best is None else f", {counted(voice.against_best, 'time')} not the best"
         skill = "" if voice.skill is None else f"; skill {voice.skill}"
         record = "answer" if voice.whole else "disputed answer"
-        yield f"  {voice.name}: {counted(voice.said, record)}, {voice.followed} followed{against}{skill}"
+        yield f"  {shown_name(voice.name)}: {counted(voice.said, record)}, {voice.followed} followed{against}{skill}"
     yield from (f"  {notice}" for notice in of.notices)
     yield from (f"  next time: {hint}" for hint in of.hints)

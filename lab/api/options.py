@@ -3,12 +3,13 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any, TypedDict, get_type_hints
 
 from annotated_types import Ge, Le
 
 from lab.advice.advising import Advising
-from lab.advice.advisors import MODEL
+from lab.advice.advisors import MODEL, split_praise
 from lab.errors import check_value, unknown
 from lab.lazy import pandas
 from lab.learning.gates import Gate
@@ -126,15 +127,25 @@ def several(advisors: Advisors) -> list[OneAdvisor]:
     return ["none" if advisors is None else advisors]
 
 
-def advising_of(advisors: Advisors, toolbox: ToolboxOrPlace) -> Advising:
-    """The advisors of a session; the toolbox (None: the user's own) holds the policies that advise."""
+def advising_of(
+    advisors: Advisors, toolbox: ToolboxOrPlace, asked: Mapping[str, Ask] = MappingProxyType({})
+) -> Advising:
+    """The advisors of a session; the toolbox (None: the user's own) holds the policies that advise.
+
+    asked: the functions that ask people, by the name of the advisor.
+    """
     box, names = None if toolbox is None else toolbox_of(toolbox, ""), several(advisors)
-    people: Mapping[str, Ask] = {}
+    people: dict[str, Ask] = {**asked}
     if models := [name for name in names if isinstance(name, str) and name.startswith(MODEL)]:
         from lab.seat.language_model import language_models
 
-        people = language_models(models)
+        people |= language_models(models)
     return replace(Advising.of(names, people), toolbox=box)
+
+
+def asks_page(advisors: Advisors) -> bool:
+    """Whether a person at a page is among the advisors."""
+    return any(isinstance(name, str) and split_praise(name)[0] == "web" for name in several(advisors))
 
 
 def heard_by(advising: Advising, tell: Tell) -> Tell:

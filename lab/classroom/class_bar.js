@@ -1,18 +1,62 @@
-// What the class says on a pupil's page: lesson, hint, help, pause.
+// What the class says on a pupil's page: lesson, hint, help, pause; in a study the step, the time that is left, and to go on.
 "use strict";
 
 const classBar = (() => {
   const el = (id) => document.getElementById(id);
+  const TICK_MS = 500;
+  let study = null, until = 0;
 
-  function show({ name, lesson, lessons, paused, hint, helped }) {
+  // The teacher's own key opens a pupil's desk, perhaps on a projector: it goes out of the address into this window's memory
+  if (new URLSearchParams(location.search).has("pupil")) {
+    sessionStorage.setItem("look", location.search);
+    history.replaceState(null, "", location.pathname);
+  }
+  const search = location.search || sessionStorage.getItem("look") || "";
+
+  function show({ name, lesson, lessons, paused, hint, helped, team, fellows, late, study: now }) {
     el("class").hidden = false;
     el("class-name").textContent = name;
     el("class-lesson").textContent = lessons > 1 ? `lesson ${lesson} of ${lessons}` : "";
+    el("class-team").hidden = !team;
+    if (team) el("class-team").textContent = `${team}${fellows.length ? `, with ${fellows.join(", ")}` : ""}${late ? ": it has begun without you, so you watch until the next lesson" : ""}`;
     el("class-hint").hidden = !hint;
     el("class-hint").textContent = hint ? `Hint: ${hint}` : "";
     el("class-helped").hidden = !helped;
     el("class-paused").hidden = !paused;
+    if (now) showStep(now);
   }
 
-  return { show };
+  function showStep(now) {
+    if (!now.here) {
+      location.replace(`/step/${search}`);
+      return;
+    }
+    study = now;
+    el("class").classList.add("study");
+    until = now.left_s === null ? null : performance.now() + 1000 * now.left_s;
+    el("class-lesson").textContent = `step ${now.step} of ${now.steps}`;
+    el("class-step").hidden = false;
+    el("class-go").hidden = !now.over;
+    el("class-withdraw").href = `/step/${search}#withdraw`;
+    tick();
+  }
+
+  function tick() {
+    if (study === null) return;
+    const left = until === null ? null : Math.max(0, Math.ceil((until - performance.now()) / 1000));
+    el("class-left").textContent = study.timed_out ? "Your time is up." : study.over ? "The lesson is over." : left === null ? "" : `${Math.floor(left / 60)}:${String(left % 60).padStart(2, "0")} left`;
+  }
+
+  async function goOn() {
+    el("class-go").disabled = true;
+    try {
+      await fetch(`/step/do${search}`, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ do: "go on", step: study.step }) });
+    } finally {
+      location.replace(`/step/${search}`);
+    }
+  }
+
+  el("class-go").onclick = goOn;
+  setInterval(tick, TICK_MS);
+  return { search, show };
 })();

@@ -35,15 +35,25 @@ class Place:
         return "https" if self.secured else "http"
 
 
-def files_of(hosts: Sequence[str], port: int) -> dict[str, dict[str, File]]:
-    """The files by the first part of their address and the rest of it; hosts, port: to which pages may open websockets."""
+def files_of(hosts: Sequence[str], port: int, of_study: bool = False) -> dict[str, dict[str, File]]:
+    """The files by the first part of their address and the rest of it; hosts, port: to which pages may open websockets.
+
+    of_study: with the page of a study's steps, and a page to join on which nobody types a name.
+    """
     sockets = " ".join(f"{scheme}://{host}:{port}" for host in hosts for scheme in ("ws", "wss"))
     policy = POLICY.format(sockets=sockets)
 
     def file(name: str) -> File:
         return File((HERE / name).read_bytes(), KINDS[Path(name).suffix], policy)
 
-    shared = {name: file(name) for name in ("class.css", "join.js", "teacher.js", "teacher_tile.js")}
+    shared = {
+        name: file(name) for name in ("class.css", "join.js", "teacher.js", "teacher_tile.js", "teacher_teams.js")
+    }
     desk = page_files("Teaching lab", [*SeatPanel.files, *(HERE / f"class_bar{kind}" for kind in KINDS)])
     desk[""] = File(desk[""].content, desk[""].kind, SERVED.replace("ws://127.0.0.1:* ws://localhost:*", sockets))
-    return {"": shared | {"": file("join.html")}, "teacher": shared | {"": file("teacher.html")}, "desk": desk}
+    steps = {name: file(name) for name in ("class.css", "step.css", "step_items.js", "step.js")} | {
+        "": file("step.html")
+    }
+    join = file("join_study.html" if of_study else "join.html")
+    rooms = {"": shared | {"": join}, "teacher": shared | {"": file("teacher.html")}, "desk": desk}
+    return rooms | ({"step": steps} if of_study else {})

@@ -10,8 +10,8 @@ import secrets
 import ssl
 import threading
 import time
-from collections import deque
-from collections.abc import Awaitable, Callable
+from asyncio.sslproto import SSLProtocol
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -21,21 +21,30 @@ from starlette.applications import Starlette
 from starlette.middleware import Middleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import HTTPConnection, Request
-from starlette.responses import JSONResponse, PlainTextResponse, Response
+from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
-from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
+from starlette.websockets import WebSocket, WebSocketDisconnect
 from uvicorn import Server as Uvicorn
 from websockets.exceptions import ConnectionClosed
 
+from lab.classroom.browser_socket import closer, sender, text_of
 from lab.classroom.certificate import fingerprint, made_certificate
+from lab.classroom.class_lesson import title_of
 from lab.classroom.class_place import Place, files_of
+from lab.classroom.class_report import HAND_OUTS, POLICY, REPORT, page_now
 from lab.classroom.code_picture import code_svg
-from lab.classroom.room import OVER, RELOAD, PupilPage, Room
-from lab.classroom.roster import Full, Roster
+from lab.classroom.desk import Desk, nothing_shown
+from lab.classroom.door import Door, Often
+from lab.classroom.room import OVER, RELOAD, REMOVED, PupilPage, Room
+from lab.classroom.roster import Roster
+from lab.classroom.step_pages import StepPages
+from lab.classroom.study import Study
+from lab.classroom.study_room import StudyRoom
+from lab.classroom.team_room import TeamRoom
 from lab.classroom.tile import COLUMNS
 from lab.errors import BadInput, WorkFailed
 from lab.files import csv_of
-from lab.view.server import config_of, listening
+from lab.view.server import answer_of, config_of, listening
 from lab.view.server_page import quiet_when_full
 
 START_S, STOP_S = 10.0, 30.0
@@ -44,10 +53,10 @@ READ_S = 0.005  # least interval between two messages from a page
 TILES_EVERY_S = 0.25
 MOST_TEACHERS = 8  # open pages of the teacher
 MOST_LOOKERS = 64  # pages that look over a shoulder
-WRONG, WRONG_S = 20, 60.0  # wrong codes that an address may try in so many seconds
-MOST_ADDRESSES = 1000
-MOST_BODY = 2048  # bytes of a request to join
-FREE = '"free": true'  # in a message about the seat
+TLS_BYTES = 1 << 14  # read at once from a connection; asyncio would keep 256 KB for each, also before hands are shaken
+MOST_OPENED, OPENED_S = 20, 10.0  # pages that a pupil may open in so many seconds
+FREE, TAKEN = '"free": true', '"free": false'  # in a message about the seat
+FRAMED_NOWHERE = f"{POLICY}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 
 
 class ClassServer:
@@ -57,8 +66,8 @@ class ClassServer:
     allowed, before anything is written; entering writes the roster and raises BadInput if it cannot, and WorkFailed.
     """
 
-    def __init__(self, roster: Roster, place: Place, port: int = 0) -> None:
-        self.roster, self._place = roster, place
+    def __init__(self, roster: Roster, place: Place, port: int = 0, study: Study | None = None) -> None:
+        self.roster, self._place, self._study = roster, place, study
         self.fingerprint = ""  # of the certificate
         self._secured: dict[str, str] = {}  # uvicorn's names of its files
         if place.certificate is not None and place.key is not None:
@@ -73,16 +82,19 @@ class ClassServer:
         self._ready = threading.Event()
         self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()), name="class", daemon=True)
         self._teachers: dict[WebSocket, asyncio.Event] = {}
-        self._wrong: dict[str, deque[float]] = {}
+        self._door = Door(lambda code, name: self.room.join(code, name))
+        self._opened: dict[int, Often] = {}  # by pupil
         base = f"{place.hosts[0]}:{self.port}"
         self.join_url = f"{place.scheme}://{base}/?code={roster.code}"
         self.teacher_url = f"{place.scheme}://{base}/teacher/?token={self._token}"
         self._picture = code_svg(self.join_url)
-        self._files = files_of(place.hosts, self.port)
+        self._files = files_of(place.hosts, self.port, study is not None)
 
     def __enter__(self) -> "ClassServer":
         self.roster.port = self.port
         try:
+            if self._study is not None:
+                self._study.begin()
             self.roster.write()
         except OSError as error:
             raise BadInput(f"folder of the class '{self.roster.folder}': {error.strerror or error}") from None
@@ -123,9 +135,15 @@ class ClassServer:
     async def _serve(self) -> None:
         self._loop, self._stopped = asyncio.get_running_loop(), asyncio.Event()
         self._loop.set_exception_handler(quiet_when_full)
-        self.room = Room(self.roster)
+        self.room = self._made_room()
         self.room.on_news = self._stir
-        server = Uvicorn(config_of(self._application(), **self._secured))
+        config = config_of(self._application(), self._socket, **self._secured)
+        config.load()
+        if config.ssl is not None:
+            SSLProtocol.max_size = TLS_BYTES
+            config.ssl.minimum_version = ssl.TLSVersion.TLSv1_2
+            config.ssl.options |= ssl.OP_NO_RENEGOTIATION
+        server = Uvicorn(config)
         serving = asyncio.create_task(server.serve(sockets=[self._socket]))
         self.room.begin()
         self._ready.set()
@@ -138,13 +156,21 @@ class ClassServer:
         self._socket.close()
         await asyncio.sleep(0)
 
+    def _made_room(self) -> Room:
+        if self._study is not None:
+            return StudyRoom(self._study)
+        return TeamRoom(self.roster) if self.roster.teams else Room(self.roster)
+
     # ---- what is served
 
     def _application(self) -> Starlette:
         guards = [Middleware(TrustedHostMiddleware, allowed_hosts=self._place.hosts, www_redirect=False)]
         routes = [
             Route("/join", self._join, methods=["POST"]),
+            *(StepPages(self.room, self._from_here).routes() if isinstance(self.room, StudyRoom) else ()),
             Route("/teacher/class.csv", self._table),
+            Route(f"/teacher/{REPORT}", self._report),
+            Route(f"/teacher/{HAND_OUTS}", self._report),
             WebSocketRoute("/teacher/frames", self._teach),
             WebSocketRoute("/desk/frames", self._sit),
             Route("/{room}/", self._file),
@@ -160,12 +186,19 @@ class ClassServer:
         file = files.get(request.path_params.get("name", ""))
         if file is None:
             return PlainTextResponse("There is no such page.\n", 404)
-        return Response(file.content, headers={"Content-Security-Policy": file.policy}, media_type=file.kind)
+        return answer_of(file)
 
     async def _table(self, request: Request) -> Response:
         if not self._is_teacher(request):
             return PlainTextResponse("This page needs the token of the teacher's address.\n", 403)
         return Response(csv_of(self.room.rows(), COLUMNS), media_type="text/csv")
+
+    async def _report(self, request: Request) -> Response:
+        """The report or the hand-outs of the class at this moment."""
+        if not self._is_teacher(request):
+            return PlainTextResponse("This page needs the token of the teacher's address.\n", 403)
+        page = await asyncio.to_thread(page_now, self.roster, request.url.path.rpartition("/")[2])
+        return Response(page, headers={"Content-Security-Policy": FRAMED_NOWHERE}, media_type="text/html")
 
     # ---- who may
 
@@ -178,43 +211,10 @@ class ClassServer:
         return origin is None or urlsplit(origin)[:2] == (self._place.scheme, asked.headers.get("host", ""))
 
     async def _join(self, request: Request) -> Response:
-        """A new pupil's address, for the right code; an address that tries many codes has to wait."""
+        """A new pupil's address, for the right code."""
         if not self._from_here(request):
             return PlainTextResponse("Another site's page may not join.\n", 403)
-        tried = self._tries(request.client.host if request.client else "")
-        if len(tried) >= WRONG:
-            return JSONResponse({"error": "Too many wrong codes: wait a minute."}, 429)
-        body = b""
-        async for part in request.stream():
-            body += part
-            if len(body) > MOST_BODY:
-                return JSONResponse({"error": "That is no request to join."}, 413)
-        try:
-            said = json.loads(body)
-            code, name = str(said["code"]), str(said.get("name", ""))
-        except (ValueError, RecursionError, TypeError, KeyError, AttributeError):
-            return JSONResponse({"error": "That is no request to join."}, 400)
-        try:
-            joined = self.roster.join(code, name)
-        except Full as reason:
-            return JSONResponse({"error": str(reason)}, 409)
-        except OSError as error:
-            return JSONResponse({"error": f"The class cannot be written: {error.strerror}"}, 500)
-        if joined is None:
-            tried.append(time.monotonic())
-            return JSONResponse({"error": "There is no class with this code: look at the board again."}, 403)
-        pupil, key = joined
-        self.room.seat(pupil)
-        return JSONResponse({"name": pupil.name, "page": f"/desk/?token={key}"})
-
-    def _tries(self, address: str) -> deque[float]:
-        """The times of the wrong codes from an address in the last WRONG_S."""
-        if len(self._wrong) > MOST_ADDRESSES:
-            self._wrong.clear()
-        tried = self._wrong.setdefault(address, deque(maxlen=WRONG))
-        while tried and tried[0] < time.monotonic() - WRONG_S:
-            tried.popleft()
-        return tried
+        return await self._door.join(request)
 
     # ---- a pupil's page, and one that looks over a shoulder
 
@@ -226,6 +226,11 @@ class ClassServer:
         if pupil is None:
             await self._look(browser)
             return
+        opened, now_s = self._opened.setdefault(pupil.number, Often(MOST_OPENED, OPENED_S)), time.monotonic()
+        if opened.is_full(now_s):
+            await browser.send_denial_response(PlainTextResponse("This page is opened too often: wait.\n", 429))
+            return
+        opened.happened(now_s)
         await browser.accept()
         page = PupilPage(pupil.number, sender(browser), closer(browser))
         self.room.arrived(page)
@@ -251,12 +256,15 @@ class ClassServer:
 
     async def _pass_on(self, browser: WebSocket, page: PupilPage, sits: bool) -> None:
         """Pass messages between a browser and its desk, until one of them leaves."""
-        desk = self.room.desks[page.number]
+        desk = self.room.desks.get(page.number)
+        if desk is None:
+            await page.close(REMOVED)
+            return
         try:
-            upstream = await desk.page(watches=not sits)
+            upstream = await desk.page(not sits, self.room.name_at(page.number))
         except OSError:
-            if desk.state in ("over", "failed", "stopped"):
-                await self._show_last(browser, page)
+            if desk.is_closed or desk.state in ("idle", "over", "failed", "stopped"):
+                await self._show_last(browser, page, desk)
             else:  # it was killed, and is started again
                 await asyncio.sleep(AGAIN_S)
                 await page.close(RELOAD)
@@ -278,28 +286,30 @@ class ClassServer:
                 await asyncio.gather(down, up, return_exceptions=True)
         await page.close(OVER if self.room.ended.is_set() else RELOAD)
 
-    async def _show_last(self, browser: WebSocket, page: PupilPage) -> None:
+    async def _show_last(self, browser: WebSocket, page: PupilPage, desk: Desk) -> None:
         """Show how a lesson ended whose process is not there any more, until the browser leaves."""
-        desk = self.room.desks[page.number]
-        shown = desk.parts | {"you": {"seat": False, "free": False, "pages": 1}}
+        shown = nothing_shown() | desk.parts | {"you": {"seat": False, "free": False, "pages": 1}}
         if desk.state != "over":
-            shown |= {"ended": f"This desk is closed: {desk.text or desk.state}. Ask your teacher to open it again."}
+            asks_nobody = {"lesson": desk.parts["lesson"] | {"asks": False}} if desk.parts.get("lesson") else {}
+            shown |= asks_nobody | {"question": None, "ended": self.room.closed_text(page.number)}
         await page.send(json.dumps({"seat": shown}))
         with suppress(WebSocketDisconnect):
             while True:
-                await browser.receive_text()
+                await text_of(browser)
 
     async def _down(self, upstream: Any, page: PupilPage, sits: bool) -> None:
         with suppress(ConnectionClosed):
             async for message in upstream:
                 await page.send(message)
+                if FREE in message or TAKEN in message:
+                    page.sees_free = FREE in message
                 if sits and FREE in message and self.room.takes_free_seat(page.number):
                     await page.say({"seat": "take"})
 
     async def _up(self, browser: WebSocket, upstream: Any, page: PupilPage, sits: bool) -> None:
         with suppress(WebSocketDisconnect, ConnectionClosed):
             while True:
-                message = await browser.receive_text()
+                message = await text_of(browser)
                 if sits and (refusal := self.room.refusal(page.number)):
                     await page.send(json.dumps({"refusal": refusal}))
                 else:
@@ -318,7 +328,7 @@ class ClassServer:
         try:
             with suppress(WebSocketDisconnect):
                 while True:
-                    await self._do(await browser.receive_text(), browser)
+                    await self._do(await text_of(browser), browser)
                     await asyncio.sleep(READ_S)
         finally:
             telling.cancel()
@@ -334,27 +344,31 @@ class ClassServer:
         seen, told = dict[int, Any](), dict[str, Any]()
         while True:
             stirred.clear()
-            tiles, now = self.room.tiles(), {"class": self._known(), "rows": self.room.rows()}
+            tiles, now = (
+                self.room.tiles(),
+                {"class": self._known(), "rows": self.room.rows(), "teams": self.room.teams()},
+            )
             news = {part: value for part, value in now.items() if told.get(part) != value}
             changed = [tile for number, tile in tiles.items() if seen.get(number) != tile]
+            gone = [number for number in seen if number not in tiles]
             seen, told = tiles, now
-            if changed or news:
-                await send(json.dumps(news | {"tiles": changed}))
+            if changed or news or gone:
+                await send(json.dumps(news | {"tiles": changed, "gone": gone}))
             await asyncio.sleep(TILES_EVERY_S)
             with suppress(TimeoutError):  # the time that questions have waited changes by itself
                 await asyncio.wait_for(stirred.wait(), 1.0)
 
     def _known(self) -> dict[str, Any]:
-        lessons = [
-            f"{options.subtask}{f' of {options.task}' if options.task else ''}" for options in self.roster.lessons
-        ]
         return {
             "code": self.roster.code,
             "join": self.join_url,
             "picture": self._picture,
-            "lessons": lessons,
+            "lessons": [title_of(lesson) for lesson in self.roster.lessons],
             "paused": self.room.paused,
             "most": self.roster.most,
+            "study": None if self._study is None else self._study.told(),
+            "open": self._door.is_open,
+            "tried": self._door.tried,
         }
 
     async def _do(self, message: str, browser: WebSocket) -> None:
@@ -372,32 +386,18 @@ class ClassServer:
                     room.go_on(number)
                 case {"do": "lesson", "pupil": int() | None as number, "lesson": int(lesson)}:
                     room.go_on(number, lesson - 1)
+                case {"do": "begin"}:
+                    room.begin_lessons()
                 case {"do": "open", "pupil": int(number)}:
                     room.open_again(number)
+                case {"do": "remove", "pupil": int(number)}:
+                    room.remove(number)
+                case {"do": "door", "open": bool(is_open)}:
+                    self._door.is_open = is_open
+                    self._stir()
                 case {"do": "end"}:
                     self.ended.set()
                 case _:
                     raise BadInput("that was no message of this page")
         except (BadInput, ValueError, RecursionError) as error:
             await sender(browser)(json.dumps({"refusal": str(error)}))
-
-
-def sender(browser: WebSocket) -> Callable[[str | bytes], Awaitable[None]]:
-    """A function that sends text to a browser, and does nothing once that has left."""
-
-    async def send(text: str | bytes) -> None:
-        with suppress(WebSocketDisconnect, RuntimeError):
-            await browser.send_text(text if isinstance(text, str) else text.decode())
-
-    return send
-
-
-def closer(browser: WebSocket) -> Callable[[int], Awaitable[None]]:
-    """A function that closes a browser's connection with a code."""
-
-    async def close(code: int) -> None:
-        with suppress(WebSocketDisconnect, RuntimeError):
-            if browser.application_state is WebSocketState.CONNECTED:
-                await browser.close(code, "the class has ended" if code == OVER else None)
-
-    return close

@@ -1,4 +1,4 @@
-"""A pupil's desk as the class's server sees it: the process with the lesson, and what its page shows.
+"""A desk as the class's server sees it: the process with the lesson, and what its page shows.
 
 The server is one of the pages of the desk's process: it only watches, and knows all parts of the document.
 """
@@ -16,10 +16,13 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, WebSocketException
 
 from lab.classroom.desk_process import DeskOrder, sit
+from lab.seat.page.page_state import PARTS, PageContent
+from lab.seat.page.teaching_page import TITLE
 
 Json = dict[str, Any]
-State = Literal["opening", "open", "over", "failed", "stopped", "lost"]
-KEPT = ("lesson", "place", "robot", "question", "curve", "standing", "notices", "members", "receipt", "ended")
+State = Literal["idle", "opening", "open", "over", "failed", "stopped", "lost"]
+KEPT = ("lesson", "place", "robot", "question", "curve", "standing", "notices", "members", "work", "receipt", "ended")
+AGAIN_S = 0.5  # after which a lost connection to the desk is made again
 MOST_MESSAGE = 1 << 24  # bytes of the desk's messages
 PRELOADED = ["lab.classroom.desk_process", "lab.skills.prepared_scene", "lab.learning.kernels"]
 
@@ -33,11 +36,19 @@ def processes() -> Any:
     return context
 
 
+def nothing_shown() -> Json:
+    """The parts of a page's document before a lesson has begun."""
+    empty = PageContent(TITLE)
+    return {part: PARTS[part](empty, 0.0) for part in KEPT}
+
+
 class Desk:
     """The process of one lesson, and its state; all methods are called in the server's event loop.
 
-    on_news: called when the shown document or the state has changed.
-    parts: the newest parts of the page's document. result: the lesson's document, once it is over. text: why it failed.
+    on_news: called when the shown document or the state has changed. state: "idle" for a desk that has no process by intent.
+    parts: the newest parts of the page's document, of a team that of the one who is first. questions: the pending questions by
+    the names of those who teach together, "" for one pupil alone. people: these names, once the process has begun.
+    result: the lesson's document, once it is over. text: why it failed.
     """
 
     def __init__(self, order: DeskOrder) -> None:
@@ -48,11 +59,13 @@ class Desk:
         self.result: Mapping[str, Any] | None = None
         self.text = ""
         self.ready = asyncio.Event()  # the page answers, or never will
-        self._address = ""
+        self.questions: dict[str, Json] = {}
+        self.people: tuple[str, ...] = ()
+        self._addresses: dict[str, str] = {}
         self._loop = asyncio.get_running_loop()
         self._pipe: Connection | None = None
         self._process: Any = None
-        self._watching: asyncio.Task[None] | None = None
+        self._watching: list[asyncio.Task[None]] = []
         self._turn, self._closed = asyncio.Lock(), False
 
     async def open(self, context: Any) -> None:
@@ -68,13 +81,23 @@ class Desk:
         other.close()
         threading.Thread(target=self._listen, args=[self._pipe], daemon=True).start()
 
+    @property
+    def is_closed(self) -> bool:
+        """Whether the class has closed the desk, whose process then ends within seconds."""
+        return self._closed
+
+    @property
+    def is_there(self) -> bool:
+        """Whether the page of the process answers."""
+        return bool(self._addresses)
+
     async def close(self) -> None:
         """End the process: the lesson is interrupted, and its journal holds every answer. Safe to call again."""
         self._closed = True
         async with self._turn:
-            if self._watching is not None:
-                self._watching.cancel()
-                await asyncio.gather(self._watching, return_exceptions=True)
+            for watching in self._watching:
+                watching.cancel()
+            await asyncio.gather(*self._watching, return_exceptions=True)
             pipe, self._pipe = self._pipe, None
             if pipe is not None:
                 with suppress(OSError):
@@ -83,12 +106,17 @@ class Desk:
                 await asyncio.to_thread(self._process.join)
         self.ready.set()
 
-    async def page(self, watches: bool = False) -> ClientConnection:
-        """A further page of the process; watches: it never gets the seat by itself. Raises OSError if the process has ended."""
+    async def page(self, watches: bool = False, name: str = "") -> ClientConnection:
+        """A further page of the process; watches: it never gets the seat by itself. Raises OSError if the process has ended.
+
+        name: of one of those who teach together; whoever is not among them watches the page of the one who is first.
+        """
         await self.ready.wait()
-        if not self._address:
+        if not self._addresses:
             raise OSError("the desk's process has ended")
-        address = f"{self._address}&watch" if watches else self._address
+        address = self._addresses.get(name)
+        if address is None or watches:
+            address = f"{address or next(iter(self._addresses.values()))}&watch"
         try:
             return await connect(address, max_size=MOST_MESSAGE, compression=None, proxy=None)
         except (WebSocketException, EOFError) as error:  # killed while it answered
@@ -107,11 +135,13 @@ class Desk:
 
     def _hear(self, said: tuple[Any, ...]) -> None:
         match said:
-            case ("page", int(port), str(token)):
-                self._address = f"ws://127.0.0.1:{port}/frames?token={token}"
-                self.state = "open"
+            case ("pages", dict(pages)):
+                self._addresses = {
+                    name: f"ws://127.0.0.1:{port}/frames?token={token}" for name, (port, token) in pages.items()
+                }
+                self.state, self.people = "open", tuple(self._addresses)
                 self.ready.set()
-                self._watching = asyncio.create_task(self._watch())
+                self._watching = [asyncio.create_task(self._watch(name)) for name in self._addresses]
             case ("over", document):
                 self.state, self.result = "over", document
             case ("failed" | "stopped" as how, str(text)):
@@ -122,16 +152,32 @@ class Desk:
         """The process has ended; if nobody asked it to, it was killed."""
         if self.state in ("opening", "open"):
             self.state, self.text = "lost", "its process has ended"
-        self._address = ""
+        self._addresses = {}
+        self.questions.clear()
         self.ready.set()
         self.on_news()
 
-    async def _watch(self) -> None:
-        """Take over the parts of the document as they change."""
-        with suppress(OSError, ConnectionClosed):
-            async with await self.page(watches=True) as page:
-                async for message in page:
-                    parts = json.loads(message).get("seat", {})
-                    if new := {part: parts[part] for part in KEPT if part in parts}:
-                        self.parts |= new
-                        self.on_news()
+    async def _watch(self, name: str) -> None:
+        """Take over the parts of a page's document as they change, also after a connection that was lost under load.
+
+        Of all pages but the first, only the question is taken over.
+        """
+        kept = KEPT if name == next(iter(self._addresses)) else ("question",)
+        while self._addresses:
+            with suppress(OSError, ConnectionClosed):
+                async with await self.page(watches=True, name=name) as page:
+                    async for message in page:
+                        parts = json.loads(message).get("seat", {})
+                        if new := {part: parts[part] for part in kept if part in parts}:
+                            self._take(name, new, kept is KEPT)
+            await asyncio.sleep(AGAIN_S)
+
+    def _take(self, name: str, new: Json, is_first: bool) -> None:
+        """Take over new parts of somebody's page."""
+        if "question" in new:
+            self.questions.pop(name, None)
+            if new["question"] is not None:
+                self.questions[name] = new["question"]
+        if is_first:
+            self.parts |= new
+        self.on_news()

@@ -1,4 +1,4 @@
-"""A desk's own process: one pupil's lesson, and a page on this computer's loopback that the class's server passes on.
+"""A desk's own process: a lesson, and its pages on this computer's loopback that the class's server passes on.
 
 The process ends when the other end of its pipe closes, however that happens; the lesson's journal then holds every answer.
 """
@@ -8,13 +8,17 @@ import signal
 import threading
 from _thread import interrupt_main
 from collections.abc import Mapping
-from contextlib import suppress
-from dataclasses import dataclass, field
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from lab.advice.entries import FILE
+from lab.advice.advisors import PAGE_OF
+from lab.advice.answer_times import AnswerTimes
+from lab.advice.entries import FILE, is_unbegun, read_journal
+from lab.classroom.class_lesson import ClassLesson
+from lab.classroom.order_lesson import order_lesson
 from lab.errors import LabError
 from lab.files import is_file
 from lab.operating_system import own_session
@@ -22,7 +26,9 @@ from lab.plugins.code_file import files_taken
 from lab.seat.lesson_seat import LessonSeat
 from lab.seat.page.teaching_page import SeatPage
 from lab.seat.run_progress import RunProgress
-from lab.teaching.kept_session import KeptSession, check_new
+from lab.seat.team import Team
+from lab.teaching.kept_order import OrderSessionOptions
+from lab.teaching.kept_session import KeptSession, check_new, read_session
 from lab.teaching.lesson import teach
 from lab.teaching.lesson_options import LessonOptions
 from lab.teaching.own_members import take_again
@@ -31,41 +37,48 @@ from lab.teaching.teacher import Teacher
 from lab.toolbox.registry import Toolbox
 from lab.view.progress import EscapingConsole
 
+RESUMED = "lab class --resume"  # where a journal is named, for errors
 LAST_S = 10.0  # time for a lesson to end after its pipe has closed
 
 
 @dataclass(frozen=True)
 class DeskOrder:
-    """What is taught at a desk: the lesson's options, the folder of its session, and the pupil's own toolbox.
+    """What is taught at a desk: the lesson's options, the folder of its session, and the toolbox.
 
+    people: the names of the pupils who teach together, with a page each; () for one alone. In a session that goes on, they are
+    those with whom it began.
     files: the members from files that the teacher has named, see `lab.plugins.code_file.files_taken`; modules: those that the
-    teacher has named, so that a session that goes on may import them.
+    teacher has named, so that a session that goes on may import them; times: whether the times of the pupil's answers are kept.
     """
 
-    options: LessonOptions
+    options: ClassLesson
     folder: Path
     toolbox: Path
     files: Mapping[str, tuple[str, str]] = field(default_factory=files_taken)
     modules: tuple[str, ...] = ()
+    people: tuple[str, ...] = ()
+    times: bool = False
 
 
 def sit(order: DeskOrder, pipe: Connection) -> None:
     """Teach the lesson, or go on with it if its folder holds one; the main function of the process.
 
-    Sent through the pipe: ("page", port, token), then ("over", document), ("failed", text) or ("stopped", text).
+    Sent through the pipe: ("pages", {name: (port, token)}), the name "" for one pupil alone; then ("over", document),
+    ("failed", text) or ("stopped", text).
     """
     own_session()  # Ctrl-C in the terminal is for the class, which ends its desks by closing their pipes
     signal.signal(signal.SIGINT, signal.default_int_handler)
     said: tuple[Any, ...] = ("failed", "ended without a word")
     try:
-        with SeatPage() as page:
-            pipe.send(("page", page.port, page.token))
+        with ExitStack() as stack:
+            pages = {name: stack.enter_context(SeatPage()) for name in _people(order) or [""]}
+            pipe.send(("pages", {name: (page.port, page.token) for name, page in pages.items()}))
             closed = threading.Event()
             threading.Thread(target=_until_closed, args=[pipe, closed], daemon=True).start()
-            said = _taught(order, page)
+            said = _taught(order, pages)
             with suppress(OSError):
                 pipe.send(said)
-            closed.wait()  # the page goes on showing how it ended, until the class closes the desk
+            closed.wait()  # the pages go on showing how it ended, until the class closes the desk
     except KeyboardInterrupt:
         pass
     except LabError as error:
@@ -73,33 +86,58 @@ def sit(order: DeskOrder, pipe: Connection) -> None:
             pipe.send(("failed", str(error)))
 
 
-def _taught(order: DeskOrder, page: SeatPage) -> tuple[Any, ...]:
+def _people(order: DeskOrder) -> list[str]:
+    """The names of the pupils who teach together."""
+    begun = order.folder / FILE
+    if not (order.people and is_file(begun)) or is_unbegun(begun):
+        return [*order.people]
+    _, options = read_session(order.folder, RESUMED, LessonOptions)
+    return [name.removeprefix(PAGE_OF) for name in options.advisor_names]
+
+
+def _taught(order: DeskOrder, pages: Mapping[str, SeatPage]) -> tuple[Any, ...]:
     try:
-        return "over", _lesson(order, page)
+        return "over", _lesson(order, pages)
     except KeyboardInterrupt as stopped:  # Interrupted, too, which is one
         return "stopped", str(stopped)
     except LabError as error:
-        page.finished(str(error))
+        for page in pages.values():
+            page.finished(str(error))
         return "failed", str(error)
 
 
-def _lesson(order: DeskOrder, page: SeatPage) -> Mapping[str, Any]:
-    """The document of `lab teach --json`."""
+def _lesson(order: DeskOrder, pages: Mapping[str, SeatPage]) -> Mapping[str, Any]:
+    """The document of `lab teach --json`, or of `lab sequence --json` for a lesson on an order."""
     take_again(order.files)
+    with ExitStack() as stack:
+        team = (
+            stack.enter_context(Team({PAGE_OF + name: page for name, page in pages.items()})) if order.people else None
+        )
+        times = AnswerTimes() if order.times else None
+        if times is not None:
+            stack.callback(times.close)
+        seat = LessonSeat(RunProgress(EscapingConsole(quiet=True)), None, pages.get(""), team=team, times=times)
+        stack.callback(seat.clear_scene)
+        toolbox = Toolbox(str(order.toolbox))
+        if isinstance(order.options, OrderSessionOptions):
+            return order_lesson(order.options, order.folder, toolbox, seat)
+        options = order.options if team is None else replace(order.options, advisors=tuple(team.pages))
+        return _table_lesson(order, options, toolbox, seat)
+
+
+def _table_lesson(order: DeskOrder, options: LessonOptions, toolbox: Toolbox, seat: LessonSeat) -> Mapping[str, Any]:
+    """The document of `lab teach --json`; a lesson that is over, whose document was lost, is run again from its journal."""
     kept = None
     if is_file(order.folder / FILE):
-        kept = KeptSession(order.folder, "lab class --resume", trusted=order.modules)
+        is_over = not is_unbegun(order.folder / FILE) and read_journal(order.folder, RESUMED).closed is not None
+        kept = KeptSession(order.folder, RESUMED, read_only=is_over, trusted=order.modules)
+        options = kept.options
     else:
         check_new(order.folder)
-    options = order.options if kept is None else kept.options
-    seat = LessonSeat(RunProgress(EscapingConsole(quiet=True)), None, page)
-    try:
-        subject = subject_of(options, kept)
-        teacher = Teacher(Toolbox(str(order.toolbox)), options.advising(seat.people()), options.seed, seat.hear)
-        document = teach(subject, options, teacher, order.folder, kept)
-        seat.lesson_over(document)
-    finally:
-        seat.clear_scene()
+    subject = subject_of(options, kept)
+    teacher = Teacher(toolbox, options.advising(seat.people()), options.seed, seat.hear)
+    document = teach(subject, options, teacher, order.folder, kept)
+    seat.lesson_over(document)
     return document
 
 

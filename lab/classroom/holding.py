@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from lab.classroom.class_place import Place
+from lab.classroom.class_report import write_report
 from lab.classroom.class_server import ClassServer
-from lab.classroom.tile import COLUMNS
 from lab.errors import BadInput
-from lab.files import csv_of, is_file, write_whole
+from lab.files import is_file
 
-TABLE = "class.csv"
 LOOK_S = 0.5  # interval at which joined pupils and finished lessons are told
 Json = dict[str, Any]
 
@@ -45,7 +44,7 @@ def place_of(
 def begun_words(server: ClassServer) -> list[str]:
     """The lines for the teacher when the class begins."""
     lines = [
-        f"pupils: {server.join_url}",
+        f"{'pupils' if server.roster.study is None else 'participants'}: {server.join_url}",
         f"code: {server.roster.code}",
         f"your own page, for nobody else: {server.teacher_url}",
     ]
@@ -56,7 +55,10 @@ def attend(server: ClassServer, tell: Callable[[str], None]) -> None:
     """Wait until the teacher's page ends the class, and tell who has joined and whose lesson is over. Ctrl-C raises."""
     known = dict[int, Json]()
     while not server.ended.is_set():
-        tiles = server.call(server.room.tiles)
+        try:
+            tiles = server.call(server.room.tiles)
+        except TimeoutError:  # the computer is busy, or was asleep
+            continue
         for number, tile in tiles.items():
             before = known.get(number)
             if before is None:
@@ -69,21 +71,9 @@ def attend(server: ClassServer, tell: Callable[[str], None]) -> None:
 
 
 def closing(server: ClassServer) -> Json:
-    """The document of the class so far; its table is written into the class's folder. Raises BadInput."""
-    rows = server.call(server.room.rows)
-    table = server.roster.folder / TABLE
-    try:
-        write_whole(table, csv_of(rows, COLUMNS).encode())
-    except OSError as error:
-        raise BadInput(f"table of the class '{table}': {error.strerror or error}") from None
-    pupils = server.call(server.room.tiles)
-    return {
-        "class": str(server.roster.folder),
-        "lessons": [options.subtask for options in server.roster.lessons],
-        "seed": server.roster.seed,
-        "pupils": [
-            {name: tile[name] for name in ("number", "name", "lesson", "state", "text")} for tile in pupils.values()
-        ],
-        "rows": rows,
-        "files": {"table": str(table)},
-    }
+    """The document of the class so far; its table, report and hand-outs are written into its folder. Raises BadInput."""
+    document = write_report(server.roster, server.call(server.room.rows))
+    tiles = server.call(server.room.tiles)
+    for pupil in document["pupils"]:
+        pupil |= {name: tiles[pupil["number"]][name] for name in ("lesson", "state", "text")}
+    return document

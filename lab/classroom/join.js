@@ -8,7 +8,7 @@ el("join").onsubmit = async (event) => {
   event.preventDefault();
   el("told").textContent = "";
   try {
-    const answer = await fetch("/join", { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ code: el("code").value, name: el("name").value }) });
+    const answer = await fetch("/join", { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ code: el("code").value, name: el("name")?.value || "" }) });
     const said = await answer.json();
     if (said.page) location.assign(said.page);
     else el("told").textContent = said.error;

@@ -6,35 +6,38 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from lab.classroom.desk import Desk, processes
 from lab.classroom.desk_process import DeskOrder
+from lab.classroom.kept_lesson import KEPT, kept_lesson
 from lab.classroom.roster import Pupil, Roster
 from lab.classroom.tile import best_first, row_of, tile_of
-from lab.errors import BadInput, LabError
-from lab.files import is_file, json_of, read_limited, write_whole
+from lab.errors import BadInput
+from lab.files import is_file, write_whole
 
 Json = dict[str, Any]
-KEPT = "lesson.json"  # beside the journal of a finished lesson: its document, and the last state of its page
-MOST_BYTES = 1 << 24
 MOST_HINT = 200  # characters
-# codes with which a page is closed: the class has ended; load again; another page of the pupil is open
-OVER, RELOAD, REPLACED = 1001, 4001, 4002
+# codes with which a page is closed: the class has ended; load again; another page of the pupil is open; the seat is taken away
+OVER, RELOAD, REPLACED, REMOVED = 1001, 4001, 4002, 4003
 MOST_LOST = 3  # times that a killed process of one lesson is started again by itself
 AT_ONCE = 2  # desks that are started at the same time
 
 
 @dataclass(eq=False)
 class PupilPage:
-    """An open page of a pupil: functions that send it text, close it, and give its desk a message as if it had sent it."""
+    """An open page of a pupil: functions that send it text, close it, and give its desk a message as if it had sent it.
+
+    sees_free: whether the seat was free when its desk last told the page of it.
+    """
 
     number: int
     send: Callable[[str], Any]
     close: Callable[[int], Any]
     say: Callable[[Json], Any] = field(default=lambda message: None)
+    sees_free: bool = False
 
 
 class Room:
@@ -64,38 +67,66 @@ class Room:
 
     def begin(self) -> None:
         """Open the desks of the roster's pupils."""
-        for pupil in self.roster.pupils:
+        for pupil in self.roster.present:
             self.seat(pupil)
+
+    def join(self, code: str, name: str) -> Json | None:
+        """What is said to a new pupil, `page` is the address; None for a wrong code. Raises Full, and OSError."""
+        joined = self.roster.join(code, name)
+        if joined is None:
+            return None
+        pupil, key = joined
+        self.seat(pupil)
+        return {"name": pupil.name, "page": f"/desk/?token={key}"}
 
     async def end(self) -> None:
         """Close all desks: lessons that are not over can be resumed."""
         self.ended.set()
-        await asyncio.gather(*(desk.close() for desk in self.desks.values()))
+        await asyncio.gather(*(desk.close() for desk in {*self.desks.values()}))
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
     # ---- desks
 
     def folder(self, pupil: Pupil, lesson: int) -> Path:
         """The folder of a pupil's lesson (from 0)."""
-        return self.roster.folder / pupil.folder / f"lesson-{lesson + 1}"
+        return self.roster.lesson_folder(pupil, lesson)
 
     def seat(self, pupil: Pupil) -> None:
         """Open the desk of a pupil at the pupil's lesson: the lesson begins, goes on, or is shown if it is over."""
-        options = replace(self.roster.lessons[pupil.lesson], seed=self.roster.seed)
-        folder, toolbox = self.folder(pupil, pupil.lesson), self.roster.folder / pupil.folder / "toolbox"
-        order = DeskOrder(options, folder, toolbox, modules=self.roster.modules)
         before = self.desks.get(pupil.number)
-        desk = self.desks[pupil.number] = Desk(order)
+        desk = self.desks[pupil.number] = Desk(self.order(pupil))
         desk.on_news = lambda: self._stirred(pupil.number, desk)
-        kept = self._kept(order.folder)
+        self._place(desk, before, self.opens(pupil))
+
+    def order(self, learner: Pupil) -> DeskOrder:
+        """What is taught at the desk of one of the roster's `learners`."""
+        folder, toolbox = self.folder(learner, learner.lesson), self.toolbox(learner)
+        times = self.roster.times or self.roster.study is not None
+        lesson = self.roster.lessons[learner.lesson]
+        return DeskOrder(lesson, folder, toolbox, modules=self.roster.modules, times=times)
+
+    def _place(self, desk: Desk, before: Desk | None, opens: bool) -> None:
+        """Put a desk in the place of another one; opens: whether a lesson that is not over gets a process."""
+        kept = kept_lesson(desk.order.folder)
         if kept is not None:
             desk.state, desk.result, desk.parts = "over", kept["document"], kept["page"]
+            desk.ready.set()
+        elif not opens:
+            desk.state = "idle"
             desk.ready.set()
         else:
             self._start(self._opened(desk, before))
         if before is not None:
             self._start(before.close())
         self.on_news()
+
+    def toolbox(self, pupil: Pupil) -> Path:
+        """The folder of the toolbox of a pupil's lesson."""
+        return self.roster.folder / pupil.folder / "toolbox"
+
+    def opens(self, pupil: Pupil) -> bool:
+        """Whether a desk that is not over gets a process: always in a class."""
+        return True
 
     async def _opened(self, desk: Desk, before: Desk | None) -> None:
         """Open a desk after the one before it, whose journal it may go on with, has been closed."""
@@ -112,35 +143,33 @@ class Room:
 
     def _stirred(self, number: int, desk: Desk) -> None:
         """Something of a desk has changed: keep a finished lesson, note when a question came."""
-        if self.desks[number] is not desk:
+        if self.desks.get(number) is not desk:
             return  # it was closed, and another one is in its place
-        question = desk.parts.get("question")
-        if not question:
-            self._asked.pop(number, None)
-        elif self._asked.get(number, (0, 0.0))[0] != question["number"]:
-            self._asked[number] = (question["number"], time.monotonic())
+        self._pose(number, desk)
         if desk.state == "over" and desk.parts.get("ended") and not is_file(desk.order.folder / KEPT):
             kept = {"document": desk.result, "page": desk.parts}
             with suppress(OSError):  # a full disk: the journal has been written, and the lesson is over anyway
                 write_whole(desk.order.folder / KEPT, json.dumps(kept).encode())
-        if desk.state == "lost" and not self.ended.is_set():
+        if desk.state == "lost" and not (self.ended.is_set() or desk.is_closed):
             lesson = (number, self.roster.pupils[number - 1].lesson)
             self._lost[lesson] += 1
             if self._lost[lesson] <= MOST_LOST:
                 self.open_again(number)
         self.on_news()
 
-    def _kept(self, folder: Path) -> Json | None:
-        path = folder / KEPT
-        if not is_file(path):
-            return None
-        with suppress(LabError, ValueError, KeyError, TypeError):
-            kept = json_of(read_limited(path, MOST_BYTES))
-            if isinstance(kept["document"], dict) and isinstance(kept["page"], dict):
-                return dict(kept)
-        return None
+    def _pose(self, number: int, desk: Desk) -> None:
+        """Note when a question has come to a pupil."""
+        question = desk.questions.get(self.name_at(number))
+        if not question:
+            self._asked.pop(number, None)
+        elif self._asked.get(number, (0, 0.0))[0] != question["number"]:
+            self._asked[number] = (question["number"], time.monotonic())
 
     # ---- pupils' pages
+
+    def name_at(self, number: int) -> str:
+        """The name of a pupil's page at the desk: "" unless several teach there."""
+        return ""
 
     def arrived(self, page: PupilPage) -> None:
         """A pupil's page is open; an older one of the same pupil, perhaps behind a closed lid, is closed."""
@@ -176,7 +205,16 @@ class Room:
             "hint": self._hints.get(number, ""),
             "helped": number in self._helped,
         }
-        self._start(page.send(json.dumps({"class": told})))
+        self._start(page.send(json.dumps({"class": told | self.told_more(number)})))
+
+    def told_more(self, number: int) -> Json:
+        """What else a pupil's page is told: nothing in a class."""
+        return {}
+
+    def closed_text(self, number: int) -> str:
+        """What a pupil's page says of a lesson that is not over and has no process."""
+        desk = self.desks[number]
+        return f"This desk is closed: {desk.text or desk.state}. Ask your teacher to open it again."
 
     # ---- what the teacher does
 
@@ -201,6 +239,9 @@ class Room:
         for page in gives:
             if page is not None:
                 self._start(page.say({"seat": "give"}))
+        page = self.pages.get(number)
+        if not begins and page is not None and page.sees_free:  # the teacher's page was closed before
+            self._start(page.say({"seat": "take"}))
         self._show_all(number)
 
     def takes_free_seat(self, number: int) -> bool:
@@ -212,7 +253,7 @@ class Room:
 
         Who is at that lesson already stays there. Raises BadInput for a pupil or lesson that there is not.
         """
-        pupils = [*self.roster.pupils] if number is None else [self._pupil(number)]
+        pupils = self.roster.present if number is None else [self._pupil(number)]
         for pupil in pupils:
             wanted = pupil.lesson + 1 if lesson is None else lesson
             if number is None and wanted >= len(self.roster.lessons):
@@ -228,18 +269,45 @@ class Room:
             if page := self.pages.get(pupil.number):
                 self._start(page.close(RELOAD))
 
+    def begin_lessons(self) -> None:
+        """Begin the lessons that wait for the teacher. Raises BadInput if none does."""
+        raise BadInput("no lesson waits: each pupil's begins when the pupil has joined")
+
     def open_again(self, number: int) -> None:
         """Open a desk again whose process has ended or failed. Raises BadInput if it has not."""
         pupil = self._pupil(number)
-        if self.desks[number].state in ("opening", "open", "over"):
-            raise BadInput(f"desk {number} is {self.desks[number].state}: nothing is to be mended")
+        self._check_closed(number)
         self.seat(pupil)
         if page := self.pages.get(number):
             self._start(page.close(RELOAD))
 
+    def _check_closed(self, number: int) -> None:
+        """Raises BadInput unless a desk's process has ended before its lesson was over."""
+        if (state := self.desks[number].state) in ("idle", "opening", "open", "over"):
+            raise BadInput(f"desk {number} is {state}: nothing is to be mended")
+
+    def remove(self, number: int) -> None:
+        """Take a pupil's seat away; somebody else may join instead. Raises BadInput for a pupil that is not there."""
+        self._pupil(number)
+        try:
+            self.roster.remove(number)
+        except OSError as error:
+            raise BadInput(f"pupil {number}: the class cannot be written: {error.strerror}") from None
+        if page := self.pages.pop(number, None):
+            self._start(page.close(REMOVED))
+        self._helped.discard(number)
+        for known in (self._hints, self._asked):
+            known.pop(number, None)
+        self._leave(number)
+        self.on_news()
+
+    def _leave(self, number: int) -> None:
+        """Close the desk of a pupil who was removed."""
+        self._start(self.desks.pop(number).close())
+
     def _pupil(self, number: int) -> Pupil:
-        if not 1 <= number <= len(self.roster.pupils):
-            raise BadInput(f"pupil {number}: the class has {len(self.roster.pupils)}")
+        if not 1 <= number <= len(self.roster.pupils) or self.roster.pupils[number - 1].is_gone:
+            raise BadInput(f"pupil {number}: nobody in the class has this number")
         return self.roster.pupils[number - 1]
 
     def _show_all(self, number: int | None = None) -> None:
@@ -256,26 +324,35 @@ class Room:
             pupil.number: tile_of(
                 pupil,
                 self.desks[pupil.number],
+                self.desks[pupil.number].questions.get(self.name_at(pupil.number)),
                 pupil.number in self.pages,
                 now_s - self._asked[pupil.number][1] if pupil.number in self._asked else None,
             )
             | {"hint": self._hints.get(pupil.number, ""), "helped": pupil.number in self._helped}
-            for pupil in self.roster.pupils
+            for pupil in self.roster.present
         }
 
     def rows(self) -> list[Json]:
         """The rows of all finished lessons: lesson by lesson, best teacher first."""
         rows: list[Json] = []
         for lesson in range(len(self.roster.lessons)):
-            finished = [(pupil, self._document(pupil, lesson)) for pupil in self.roster.pupils]
-            rows += best_first([row_of(pupil, lesson, document) for pupil, document in finished if document])
+            finished = [(learner, self._document(learner, lesson)) for learner in self.roster.learners]
+            rows += best_first([row_of(learner, lesson, document) for learner, document in finished if document])
         return rows
 
-    def _document(self, pupil: Pupil, lesson: int) -> Json | None:
-        if lesson == pupil.lesson:
-            result = self.desks[pupil.number].result
+    def teams(self) -> list[Json]:
+        """What the teacher sees of each team; none in a class without teams."""
+        return []
+
+    def _document(self, learner: Pupil, lesson: int) -> Json | None:
+        if lesson == learner.lesson:
+            result = self.desk_of(learner).result
             return None if result is None else dict(result)
-        if (pupil.number, lesson) not in self._finished:
-            kept = self._kept(self.folder(pupil, lesson))
-            self._finished[pupil.number, lesson] = None if kept is None else dict(kept["document"])
-        return self._finished[pupil.number, lesson]
+        if (learner.number, lesson) not in self._finished:
+            kept = kept_lesson(self.folder(learner, lesson))
+            self._finished[learner.number, lesson] = None if kept is None else dict(kept["document"])
+        return self._finished[learner.number, lesson]
+
+    def desk_of(self, learner: Pupil) -> Desk:
+        """The desk of one of the roster's `learners`."""
+        return self.desks[learner.number]

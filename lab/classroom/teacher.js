@@ -3,23 +3,46 @@
 
 const el = (id) => document.getElementById(id), { make } = classTile;
 const boxes = new Map(), SURE_MS = 3000;
-let socket = null, paused = false, wall = false, sure = 0;
+let END = "End the class";
+let study = null; // its title, and what this page may do in it
+let socket = null, paused = false, wall = false, isOpen = true, sure = 0;
+
+// Everybody sees the address on a projector: its key goes into this window's memory
+if (location.search) {
+  sessionStorage.setItem("class", location.search);
+  history.replaceState(null, "", location.pathname);
+}
+const key = sessionStorage.getItem("class") || "";
 
 const say = (message) => socket && socket.readyState === WebSocket.OPEN && socket.send(JSON.stringify(message));
+const look = (tile) => window.open(`/desk/${key}&pupil=${tile.number}`, "_blank", "noopener");
 const act = {
+  look,
   help: (tile) => {
     say({ do: "help", pupil: tile.number, on: !tile.helped });
-    if (!tile.helped) window.open(`/desk/${location.search}&pupil=${tile.number}`, "_blank", "noopener");
+    if (!tile.helped) look(tile);
   },
   hint: (tile, text) => say({ do: "hint", pupil: tile.number, text }),
   next: (tile) => say({ do: "next", pupil: tile.number }),
   open: (tile) => say({ do: "open", pupil: tile.number }),
+  remove: (tile) => say({ do: "remove", pupil: tile.number }),
 };
 
 function showClass(now) {
   paused = now.paused;
   el("pause").textContent = paused ? "Go on" : "Pause all";
   el("pause").setAttribute("aria-pressed", String(paused));
+  study = now.study;
+  if (study) {
+    el("title").textContent = document.title = study.title;
+    el("pause").hidden = !study.may.includes("pause");
+    el("to-lesson").hidden = el("all").hidden = true;
+    el("end").textContent = END = "End for now";
+  }
+  isOpen = now.open;
+  el("door").textContent = isOpen ? "Close the door" : "Open the door";
+  el("door").setAttribute("aria-pressed", String(!isOpen));
+  el("tried").hidden = !now.tried;
   el("picture").src = now.picture;
   el("address").textContent = now.join.replace(/\?.*/, "");
   el("code").textContent = now.code;
@@ -32,20 +55,33 @@ function showClass(now) {
   if (chosen) el("lesson").value = chosen;
 }
 
-function showTiles(tiles) {
+function showTiles(tiles, gone) {
+  removeTiles(gone);
   for (const tile of tiles) {
     if (!boxes.has(tile.number)) {
       boxes.set(tile.number, classTile.create(act));
       el("tiles").append(boxes.get(tile.number).box);
     }
-    classTile.draw(boxes.get(tile.number), tile);
+    classTile.draw(boxes.get(tile.number), tile, study ? study.may : ["help", "hint", "next", "remove"]);
   }
+  count();
+}
+
+function removeTiles(numbers) {
+  for (const number of numbers) {
+    boxes.get(number)?.box.remove();
+    boxes.delete(number);
+  }
+}
+
+function count() {
   const here = document.querySelectorAll("#tiles small.here").length;
-  el("how").textContent = boxes.size ? `${here} of ${boxes.size} pupils are here` : "Nobody has joined yet.";
+  el("how").textContent = boxes.size ? `${here} of ${boxes.size} ${study ? "participants" : "pupils"} are here` : "Nobody has joined yet.";
 }
 
 const HEADS = [
-  ["lesson", "Lesson"], ["name", "Pupil"], ["solved", "Solved"], ["final_steps", "Steps at the end"], ["optimal_steps", "Fewest possible"], ["episodes", "Episodes"],
+  ["lesson", "Lesson"], ["name", "Pupil"], ["solved", "Solved"], ["final_steps", "Steps at the end"], ["optimal_steps", "Fewest possible"],
+  ["cost", "Best order"], ["optimal_cost", "Proven optimum"], ["episodes", "Episodes"],
   ["answers", "Answers"], ["own_choice_too", "Its own choice, too"], ["not_best", "Not the best"], ["misleads", "Did not help"], ["believed", "Believed to the end"], ["tau", "Skill (tau)"],
 ];
 const shown = (value) => (value === null ? "" : value === true ? "yes" : value === false ? "no" : typeof value === "number" && !Number.isInteger(value) ? value.toFixed(2) : String(value));
@@ -57,23 +93,30 @@ function showRows(rows) {
     made.append(...cells.map((text) => make(kind, text)));
     return made;
   };
-  el("report").querySelector("thead").replaceChildren(line(HEADS.map(([, head]) => head), "th"));
+  const heads = HEADS.filter(([name]) => rows.some((row) => row[name] !== null));
+  el("report").querySelector("thead").replaceChildren(line(heads.map(([, head]) => head), "th"));
   el("report").querySelector("tbody").replaceChildren(...rows.map((row, k) => {
-    const made = line(HEADS.map(([name]) => shown(row[name])), "td");
+    const made = line(heads.map(([name]) => shown(row[name])), "td");
     if (row.solved && (k === 0 || rows[k - 1].lesson !== row.lesson)) made.className = "first";
     return made;
   }));
 }
 
 function follow(pause = 300) {
-  socket = new WebSocket(new URL(`frames${location.search}`, location.href.replace(/^http/, "ws")));
+  let first = true; // all tiles come in the first message
+  socket = new WebSocket(new URL(`frames${key}`, location.href.replace(/^http/, "ws")));
   socket.onopen = () => { pause = 300; };
   socket.onmessage = (event) => {
-    const { class: now, rows, tiles, refusal } = JSON.parse(event.data);
+    const { class: now, rows, tiles, teams, gone, refusal } = JSON.parse(event.data);
     el("told").textContent = refusal || "";
     if (now) showClass(now);
     if (rows) showRows(rows);
-    if (tiles) showTiles(tiles);
+    if (teams) classTeams.show(teams);
+    if (tiles) {
+      if (first) removeTiles([...boxes.keys()].filter((number) => !tiles.some((tile) => tile.number === number)));
+      first = false;
+      showTiles(tiles, gone);
+    }
   };
   socket.onclose = () => {
     el("how").textContent = "connection lost: trying again";
@@ -81,6 +124,7 @@ function follow(pause = 300) {
   };
 }
 
+el("begin").onclick = () => say({ do: "begin" });
 el("pause").onclick = () => say({ do: "pause", on: !paused });
 el("all").onclick = () => say({ do: "lesson", pupil: null, lesson: Number(el("lesson").value) });
 el("board").onclick = () => {
@@ -92,7 +136,13 @@ el("end").onclick = () => {
   if (performance.now() < sure) say({ do: "end" });
   sure = performance.now() + SURE_MS;
   el("end").textContent = "Once more: end it";
-  setTimeout(() => { el("end").textContent = "End the class"; }, SURE_MS);
+  setTimeout(() => { el("end").textContent = END; }, SURE_MS);
 };
-el("csv").href = `class.csv${location.search}`;
+el("door").onclick = () => say({ do: "door", open: !isOpen });
+for (const [id, file] of [["csv", "class.csv"], ["paper", "report.html"], ["handed", "hand-outs.html"]]) {
+  el(id).onclick = () => { // a link shows its address to whoever sees the screen
+    el(id).href = file + key;
+    setTimeout(() => { el(id).href = "#"; });
+  };
+}
 follow();

@@ -2,8 +2,8 @@
 "use strict";
 
 const classTile = (() => {
-  const SVG = "http://www.w3.org/2000/svg", WIDE = 240, HIGH = 64, LONG_S = 60;
-  const STATES = { opening: "opens", open: "", over: "done", failed: "failed", stopped: "stopped", lost: "its process has ended" };
+  const SVG = "http://www.w3.org/2000/svg", WIDE = 240, HIGH = 64, LONG_S = 60, SURE_MS = 3000;
+  const STATES = { idle: "", opening: "opens", open: "", over: "done", failed: "failed", stopped: "stopped", lost: "its process has ended" };
   const VERDICTS = { rejected: "dropped: its advice misled", converged: "needs no more advice", left: "works alone" };
 
   function make(name, text, kind) {
@@ -21,12 +21,12 @@ const classTile = (() => {
     return made;
   }
 
-  // The means of the episodes, guided ones orange, and the fewest steps possible as a line
-  function curve({ curve: means, guided, optimal }) {
+  // The means of the episodes, guided ones orange, and the fewest steps possible, or the proven bound of an order, as a line
+  function curve({ curve: means, guided, optimal, kind }) {
     const svg = document.createElementNS(SVG, "svg");
     svg.setAttribute("viewBox", `0 0 ${WIDE} ${HIGH}`);
     svg.setAttribute("role", "img");
-    svg.setAttribute("aria-label", means.length ? `steps an episode, lately ${Math.round(means[means.length - 1])}` : "no episode yet");
+    svg.setAttribute("aria-label", means.length ? `${kind === "order" ? "cost of an episode's order" : "steps an episode"}, lately ${Math.round(means[means.length - 1])}` : "no episode yet");
     const top = Math.log(Math.max(2, ...means)), low = Math.log(Math.max(1, Math.min(optimal || 1, ...means)));
     const y = (steps) => HIGH - 4 - ((Math.log(Math.max(1, steps)) - low) / Math.max(1e-9, top - low)) * (HIGH - 8);
     const x = (k) => 3 + (k * (WIDE - 6)) / Math.max(1, means.length - 1);
@@ -41,13 +41,17 @@ const classTile = (() => {
     return svg;
   }
 
+  const best = ({ kind, best: least, optimal, proven }) => (kind !== "order" || least === null ? "" : `; best order ${Math.round(least)}${optimal ? `, ${proven ? "optimum" : "bound"} ${Math.round(optimal)}` : ""}`);
   // How the lesson of a tile ended: solved, or how far it got; a longer path than the shortest is not solved
-  function ending({ solved, final_steps: steps, optimal }) {
+  function ending({ kind, solved, final_steps: steps, optimal }) {
+    if (kind === "order") return solved ? "found a best order" : "its order is not proven the best";
     if (solved) return `solved${steps ? ` in ${Math.round(steps)} steps` : ""}`;
     return steps ? `not solved, ${Math.round(steps)} steps${optimal ? `, fewest ${optimal}` : ""}` : "not solved";
   }
 
+
   function status(tile) {
+    if (tile.state === "idle") return [tile.study ? tile.study.doing : "", tile.study && tile.study.doing === "finished" ? "over" : ""];
     if (tile.state === "over") return [`${STATES.over}: ${ending(tile)}`, tile.state];
     if (tile.state !== "open") return [`${STATES[tile.state]}${tile.text ? `: ${tile.text}` : ""}`, tile.state];
     if (!tile.here && tile.asks) return ["asks, and nobody is there", "away"];
@@ -58,10 +62,8 @@ const classTile = (() => {
   // An empty tile, whose buttons stay the same while what it says changes; act: what they do, by name
   function create(act) {
     const box = make("article", undefined, "tile"), head = make("h2"), says = make("p", "", "says"), facts = make("p"), hint = make("p", "", "hint"), row = make("p", undefined, "row");
-    const name = make("span"), here = make("small"), look = make("a", "Look"), form = make("form", undefined, "row"), field = make("input");
-    const parts = { box, name, here, says, facts, hint, look, picture: curve({ curve: [], guided: [] }), tile: null };
-    look.target = "_blank";
-    look.title = "over the shoulder, live; while you help you answer there";
+    const name = make("span"), here = make("small"), form = make("form", undefined, "row"), field = make("input");
+    const parts = { box, name, here, says, facts, hint, picture: curve({ curve: [], guided: [] }), tile: null };
     field.maxLength = 200;
     form.hidden = true;
     form.append(field, make("button", "Show"));
@@ -78,13 +80,23 @@ const classTile = (() => {
       field.setAttribute("aria-label", `hint for ${parts.tile.name}`);
       field.focus();
     });
+    const look = button("Look", "over the shoulder, live; while you help you answer there", () => act.look(parts.tile));
+    let sure = 0;
+    const remove = button("Remove", "take this seat away, for good", () => {
+      if (performance.now() < sure) act.remove(parts.tile);
+      sure = performance.now() + SURE_MS;
+      remove.textContent = "Once more: remove";
+      setTimeout(() => { remove.textContent = "Remove"; }, SURE_MS);
+    });
     head.append(name, here);
-    row.append(look, parts.help, ask, button("Next", "to the next lesson", () => act.next(parts.tile)), parts.open);
+    Object.assign(parts, { hints: ask, next: button("Next", "to the next lesson", () => act.next(parts.tile)), remove });
+    row.append(look, parts.help, ask, parts.next, remove, parts.open);
     box.append(head, parts.picture, says, facts, hint, row, form);
     return parts;
   }
 
-  function draw(parts, tile) {
+  // may: which of the buttons are there
+  function draw(parts, tile, may) {
     const [says, kind] = status(tile), picture = curve(tile);
     parts.tile = tile;
     parts.box.className = `tile ${kind}`;
@@ -94,9 +106,13 @@ const classTile = (() => {
     parts.here.textContent = parts.here.className = tile.here ? "here" : "away";
     parts.says.textContent = says;
     const answers = `${tile.taken} answered${tile.skipped ? `, ${tile.skipped} left to it` : ""}${tile.misleads ? `, ${tile.misleads} did not help` : ""}`;
-    parts.facts.textContent = `${tile.title || "no lesson yet"}: episode ${tile.episode}${tile.episodes ? ` of ${tile.episodes}` : ""}; ${answers}`;
+    parts.facts.textContent = `${tile.title || "no lesson yet"}: episode ${tile.episode}${tile.episodes ? ` of ${tile.episodes}` : ""}; ${answers}${best(tile)}`;
+    if (tile.study) parts.facts.textContent = `Step ${tile.study.step} of ${tile.study.steps}${tile.study.arm ? `, arm ${tile.study.arm}` : ""} (${tile.study.order.join(", ")})${tile.state === "idle" ? "" : `; ${parts.facts.textContent}`}`;
+    parts.help.hidden = !may.includes("help");
+    parts.hints.hidden = !may.includes("hint");
+    parts.next.hidden = !may.includes("next");
+    parts.remove.hidden = !may.includes("remove");
     parts.hint.textContent = tile.hint ? `Hint: ${tile.hint}` : "";
-    parts.look.href = `/desk/${location.search}&pupil=${tile.number}`;
     parts.help.textContent = tile.helped ? "Give back" : "Help";
     parts.open.hidden = !["failed", "stopped", "lost"].includes(tile.state);
   }

@@ -7,17 +7,23 @@ from lab.classroom.desk import Desk
 from lab.classroom.roster import Pupil
 
 Json = dict[str, Any]
+TABLE = "class.csv"  # the rows, in the folder of the class
 MOST_POINTS = 60  # of a tile's curve
 COLUMNS = (
     *("pupil", "name", "lesson", "skill", "state", "episodes", "solved", "final_steps", "optimal_steps"),
     *("answers", "own_choice_too", "not_best", "helped_steps", "guided_episodes", "misleads", "believed", "tau"),
+    *("cost", "optimal_cost", "objective"),  # of a lesson on an order
 )
 
 
-def tile_of(pupil: Pupil, desk: Desk, here: bool, asked_s: float | None) -> Json:
-    """The tile; here: whether the pupil's page is open; asked_s: how long [s] a question has waited, None: none does."""
+def tile_of(pupil: Pupil, desk: Desk, question: Json | None, here: bool, asked_s: float | None) -> Json:
+    """The tile of a pupil.
+
+    question: the one that waits for the pupil, asked_s: how long [s] it has waited, None for none; here: whether the pupil's page
+    is open.
+    """
     lesson, standing = desk.parts.get("lesson") or {}, desk.parts.get("standing") or {}
-    curve, question = desk.parts.get("curve") or {}, desk.parts.get("question")
+    curve = desk.parts.get("curve") or {}
     return {
         "number": pupil.number,
         "name": pupil.name,
@@ -28,60 +34,75 @@ def tile_of(pupil: Pupil, desk: Desk, here: bool, asked_s: float | None) -> Json
         "text": desk.text,
         "episode": curve.get("count", 0),
         "episodes": lesson.get("episodes", 0),
+        "kind": lesson.get("kind", "steps"),
         "optimal": lesson.get("optimal"),
-        "curve": _thinned(curve.get("means", [])),
-        "guided": _thinned(curve.get("guided", [])),
+        "proven": lesson.get("proven", True),
+        "best": (curve.get("best") or [None])[0],
+        "curve": thinned(curve.get("means", [])),
+        "guided": thinned(curve.get("guided", [])),
         "asks": question["title"] if question else "",
         "asked_s": None if asked_s is None else round(asked_s),
         "taken": standing.get("taken", 0),
         "skipped": standing.get("skipped", 0),
         "misleads": standing.get("misleads", 0),
         "verdict": standing.get("verdict", ""),
-        "solved": None if desk.result is None else bool(desk.result["solved"]),
-        "final_steps": None if desk.result is None else desk.result["final_steps"],
+        "solved": None if desk.result is None else is_solved(desk.result),
+        "final_steps": None if desk.result is None else desk.result.get("final_steps"),
     }
 
 
 def row_of(pupil: Pupil, lesson: int, result: Mapping[str, Any]) -> Json:
-    """The row of a pupil's finished lesson (from 0), from its document; what is not known is None."""
+    """The row of a pupil's finished lesson (from 0), from its document; what is not known, or does not apply, is None."""
     receipt = result.get("receipt") or {}
     skill = receipt.get("skill") or {}
-    return {
+    advice = (result.get("advice") or [{}])[0] if is_order(result) else result
+    known = {
         "pupil": pupil.number,
         "name": pupil.name,
         "lesson": lesson + 1,
-        "skill": result["skill"],
+        "skill": f"order of {result['task']}" if is_order(result) else result["skill"],
         "state": "over",
         "episodes": result["episodes"],
-        "solved": result["solved"],
-        "final_steps": result["final_steps"],
-        "optimal_steps": result["optimal_steps"],
+        "solved": is_solved(result),
         "answers": receipt.get("taken"),
         "own_choice_too": receipt.get("agreed"),
         "not_best": receipt.get("against_best"),
-        "helped_steps": result["helped_steps"],
-        "guided_episodes": len(result["guided_episodes"]),
-        "misleads": result["misleads"],
-        "believed": result["rejected_at_episode"] is None,
+        "helped_steps": advice.get("helped_steps"),
+        "guided_episodes": receipt.get("guided") if is_order(result) else len(result["guided_episodes"]),
+        "misleads": advice.get("misleads"),
+        "believed": advice.get("rejected_at_episode") is None,
         "tau": skill.get("tau"),
     }
+    own = ("cost", "optimal_cost", "objective") if is_order(result) else ("final_steps", "optimal_steps")
+    return dict.fromkeys(COLUMNS) | known | {name: result[name] for name in own}
+
+
+def is_order(result: Mapping[str, Any]) -> bool:
+    """Whether a lesson's document is that of advice on an order, as `lab sequence --json` gives it."""
+    return "best_sequence" in result
+
+
+def is_solved(result: Mapping[str, Any]) -> bool:
+    """Whether a lesson reached its goal; one on an order did if its own order is proven optimal."""
+    return result["optimal_cost"] is not None and result["gap"] == 0.0 if is_order(result) else bool(result["solved"])
 
 
 def best_first(rows: list[Json]) -> list[Json]:
-    """The rows of one lesson, best teacher first: a solved lesson, the shortest way, then the fewest answers."""
+    """The rows of one lesson, best teacher first: a solved lesson, the shortest way or order, then the fewest answers."""
     far = float("inf")
     return sorted(
         rows,
         key=lambda row: (
             not row["solved"],
             far if row["final_steps"] is None else row["final_steps"],
+            far if row["cost"] is None else row["cost"],
             far if row["answers"] is None else row["answers"],
             row["pupil"],
         ),
     )
 
 
-def _thinned(values: list[float]) -> list[float]:
+def thinned(values: list[float]) -> list[float]:
     """At most MOST_POINTS of the values, evenly spread, the last included."""
     if len(values) <= MOST_POINTS:
         return values

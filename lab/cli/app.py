@@ -61,7 +61,7 @@ STOPPED = "stopped by Ctrl-C"
 GROUPS = {
     "toolbox": "The policies that were learned.",
     "task": "Task files.",
-    "study": "The thesis's tables and figures again, and comparisons of our own.",
+    "study": "The thesis's tables and figures again, comparisons of our own, and studies with people.",
 }
 
 
@@ -243,6 +243,16 @@ COMMANDS = {  # words after `lab` -> the command
         "study",
         "Draw a leaderboard from files of scores, one for each member of a study.",
         "lab study board advicebench-study/scores/*.csv",
+    ),
+    "study export": Command(
+        "people",
+        "Write a class or a study with people as tables for statistics: a lesson a row, an answer a row, and their dictionary.",
+        "lab study export who-asks --out who-asks-data --parquet",
+    ),
+    "study people": Command(
+        "people",
+        "Compare the arms of a study with people: mixed-effects model, rank tests, sizes of effects, figures, and a report.",
+        "lab study people who-asks-data --out who-asks-report",
     ),
     "study compare": Command(
         "compare",

@@ -7,10 +7,12 @@ import typer
 
 from lab.cli import deferred
 from lab.cli.families import from_files, offers
-from lab.cli.options import GateName, Json, LearnerName, Own, Port, Seed, TrustModule
+from lab.cli.options import GateName, Json, LearnerName, Own, Port, Seed, Times, TrustModule
 from lab.cli.output import console, show
 from lab.errors import BadInput, counted
 from lab.lazy import rich
+
+SEATS = 30  # seats of a class
 
 
 def hold_class(
@@ -18,7 +20,7 @@ def hold_class(
         list[str] | None,
         typer.Argument(
             help="The lessons, in their order: whatever lab teach takes as SUBTASK: {skills}, a world, gym:ID, "
-            "./mine.py:Problem, {problems}.",
+            "./mine.py:Problem, {problems}; or order:TASK, advice on an order, as lab sequence TASK asks for it.",
             metavar="LESSON...",
             autocompletion=offers("skills", "problems"),
             callback=from_files("problems"),
@@ -31,7 +33,30 @@ def hold_class(
         Path | None,
         typer.Option("--resume", help="Go on with the class in this folder: all lessons go on where they stopped."),
     ] = None,
-    pupils: Annotated[int, typer.Option("--pupils", min=1, max=60, help="The number of seats.")] = 30,
+    report: Annotated[
+        Path | None,
+        typer.Option(
+            "--report", help="Write the report and the hand-outs of the class in this folder, and hold no class."
+        ),
+    ] = None,
+    study: Annotated[
+        Path | None,
+        typer.Option(
+            "--study",
+            metavar="FILE",
+            help="A study with people by this protocol (TOML), instead of a class with lessons.",
+        ),
+    ] = None,
+    pupils: Annotated[int, typer.Option("--pupils", min=1, max=60, help="The number of seats.")] = SEATS,
+    teams: Annotated[
+        int,
+        typer.Option(
+            "--teams",
+            min=0,
+            max=12,
+            help="The pupils teach in so many teams, each with one learner that judges whom of them to believe; 0: each alone.",
+        ),
+    ] = 0,
     typed_names: Annotated[
         bool, typer.Option("--typed-names", help="Pupils type their names; by default each is given a pseudonym.")
     ] = False,
@@ -56,6 +81,7 @@ def hold_class(
         Path | None, typer.Option("--certificate", help="Certificate (PEM); default: made on the spot.")
     ] = None,
     key: Annotated[Path | None, typer.Option("--key", help="The key of the certificate (PEM).")] = None,
+    times: Times = False,
     trust_module: TrustModule = None,
     own: Own = None,
     port: Port = 0,
@@ -64,23 +90,49 @@ def hold_class(
 ) -> None:
     """A class in browsers: each pupil teaches a learner of their own, and the teacher looks on and helps.
 
+    With --study it is a study with people: participants agree, go through the protocol's arms, and may withdraw.
     Pupils open the printed address and type the code. Their learners go on where they stopped: after a closed lid, a killed
     server, and with --resume.
     """
-    if resume is not None:
-        if lessons or out is not None:
+    if report is not None:
+        if lessons or out is not None or resume is not None:
             raise BadInput(
-                f"--resume {resume} beside lessons or --out: a class goes on with its own lessons in its own folder"
+                f"--report {report} beside lessons, --out or --resume: it is written of a class that is there, and none is held"
+            )
+        show(deferred.write_report(deferred.Roster.read(report, "--report")), as_json, _report_summary)
+        return
+    held = None
+    if resume is not None:
+        if lessons or out is not None or study is not None:
+            raise BadInput(
+                f"--resume {resume} beside lessons, --study or --out: a class goes on with its own lessons in its own folder"
             )
         roster = deferred.Roster.read(resume)
         roster.modules = tuple(trust_module or ())
+        held = None if roster.study is None else deferred.StudyWithPeople.read(roster)
+    elif study is not None:
+        given = {
+            "LESSON": lessons,
+            "--typed-names": typed_names,
+            "--task": task,
+            "--learner": learner,
+            "--gate": gate,
+            "--episodes": episodes,
+            "--seed": seed,
+            "--pupils": pupils != SEATS,
+            "--teams": teams,
+        }
+        held = _study(study, out, tuple(trust_module or ()), [name for name, value in given.items() if value])
+        roster = held.roster
     else:
         roster = _new(lessons or [], out, pupils, typed_names, seed, (task, learner, gate, episodes))
-        roster.modules = tuple(filter(None, map(_module, roster.lessons)))
+        roster.teams = _checked_teams(teams, roster)
+        roster.modules = tuple(filter(None, map(deferred.module_of, roster.lessons)))
+    roster.times = roster.times or times
     _check(roster)
     place = deferred.place_of(lan, name or (), certificate, key)
     said = console()
-    with deferred.ClassServer(roster, place, port or roster.port) as server:
+    with deferred.ClassServer(roster, place, port or roster.port, held) as server:
         for line in deferred.begun_words(server):
             said.print(line, soft_wrap=True, highlight=False)
         if said.is_terminal:
@@ -101,8 +153,13 @@ def _new(
     if out is None:
         raise BadInput("--out is missing: the folder in which the class is kept, such as --out monday")
     task, learner, gate, episodes = options
-    wanted = []
+    if learner is not None and all(lesson.startswith(deferred.ORDER_LESSON) for lesson in lessons):
+        raise BadInput(f"--learner {learner}: lessons on an order are learned by srl, and there is no other: remove it")
+    wanted: list[deferred.ClassLesson] = []
     for lesson in lessons:
+        if lesson.startswith(deferred.ORDER_LESSON):
+            wanted.append(deferred.order_lesson_named(lesson, gate, episodes, seed))
+            continue
         is_skill = lesson in deferred.SKILLS
         of = deferred.LessonOptions(
             lesson, task if is_skill else None, None, learner, gate, None, deferred.PUPILS, episodes=episodes, seed=seed
@@ -111,25 +168,56 @@ def _new(
     return deferred.Roster.new(out, wanted, seed, pupils, typed_names)
 
 
-def _module(lesson: "deferred.LessonOptions") -> str:
-    """The module that a lesson such as gym:MODULE:ID would import, "" for none."""
-    return deferred.parse_name(lesson.subtask, "LESSON").module if lesson.subtask.startswith("gym:") else ""
+def _study(file: Path, out: Path | None, modules: tuple[str, ...], beside: list[str]) -> "deferred.StudyWithPeople":
+    """A new study. Raises BadInput, also for options that its protocol has, and for typed names, which it never has."""
+    if "--typed-names" in beside:
+        raise BadInput(f"--typed-names beside --study {file}: participants have ids or pseudonyms, and never names")
+    if beside:
+        raise BadInput(
+            f"{beside[0]} beside --study {file}: lessons, options, seed and seats of a study are in its protocol"
+        )
+    if out is None:
+        raise BadInput("--out is missing: the folder in which the study is kept, such as --out who-asks")
+    held = deferred.StudyWithPeople.new(file, out, lambda lesson: _check_lesson(lesson, str(file), modules))
+    held.roster.modules = modules
+    return held
+
+
+def _checked_teams(teams: int, roster: "deferred.Roster") -> int:
+    """The number of teams. Raises BadInput for teams in a class that has a lesson on an order."""
+    for lesson in roster.lessons if teams else ():
+        if lesson.command == "sequence":
+            raise BadInput(
+                f"--teams {teams} with the lesson '{deferred.name_of(lesson)}': teams advise one table, no order"
+            )
+    return teams
 
 
 def _check(roster: "deferred.Roster") -> None:
     """Check every lesson before anybody joins. Raises BadInput, also for code that is named in the class's file alone."""
     for lesson in roster.lessons:
-        if (module := _module(lesson)) and module not in roster.modules:
-            raise BadInput(
-                f"class '{roster.folder}' names the module '{module}', whose code would run: if you trust whoever made it, "
-                f"say --trust-module {module}"
-            )
-        deferred.subject_of(lesson)
+        _check_lesson(lesson, f"class '{roster.folder}'", roster.modules)
+
+
+def _check_lesson(lesson: "deferred.ClassLesson", where: str, modules: tuple[str, ...]) -> None:
+    if (module := deferred.module_of(lesson)) and module not in modules:
+        raise BadInput(
+            f"{where} names the module '{module}', whose code would run: if you trust whoever made it, "
+            f"say --trust-module {module}"
+        )
+    deferred.check_lesson(lesson)
+
+
+def _report_summary(document: dict[str, Any]) -> Any:
+    files = document["files"]
+    over = counted(len(document["rows"]), "lesson")
+    return f"{over} taught; report: {files['report']}; hand-outs: {files['hand_outs']}; table: {files['table']}"
 
 
 def _summary(document: dict[str, Any]) -> Any:
     over = len(document["rows"])
     return (
         f"{counted(len(document['pupils']), 'pupil')}, {counted(over, 'lesson')} taught; table: {document['files']['table']}; "
+        f"report: {document['files']['report']}; hand-outs: {document['files']['hand_outs']}; "
         f"go on with: lab class --resume {document['class']}"
     )

@@ -5,17 +5,23 @@ from typing import TYPE_CHECKING
 from lab.lazy import loader
 
 if TYPE_CHECKING:
-    from lab.advice.advisors import ADVISORS, MODEL, AdvisorName, split_praise
+    from lab.advice.advisors import ADVISORS, MODEL, PAGE_OF, AdvisorName, split_praise
+    from lab.advice.answer_times import AnswerTimes
     from lab.advice.entries import Read, read_journal
     from lab.advice.panel import ASKED, DECISIONS
     from lab.api.scenes import SceneRequest as SceneAsked
     from lab.api.scenes import seen
     from lab.audit.audit import audit, kept_evidence
+    from lab.classroom.class_lesson import ADVISORS as PUPILS
+    from lab.classroom.class_lesson import ORDER as ORDER_LESSON
+    from lab.classroom.class_lesson import ClassLesson, check_lesson, module_of, name_of, order_lesson_named
+    from lab.classroom.class_report import write_report
     from lab.classroom.class_server import ClassServer
     from lab.classroom.code_picture import code_text
+    from lab.classroom.export import export, exported
     from lab.classroom.holding import attend, begun_words, closing, place_of
-    from lab.classroom.roster import ADVISORS as PUPILS
     from lab.classroom.roster import Roster
+    from lab.classroom.study import Study as StudyWithPeople
     from lab.export import FORMATS
     from lab.export.commands import Path as Lines
     from lab.export.play import deviation
@@ -36,6 +42,7 @@ if TYPE_CHECKING:
     from lab.production.operation.commands import Done, pace
     from lab.production.operation.desk import Desk, RunDesk
     from lab.production.operation.operation import Operation
+    from lab.production.order_session import sequenced
     from lab.production.publication import CARD, publish, write_card
     from lab.production.report import write_files
     from lab.production.run import remember
@@ -44,12 +51,12 @@ if TYPE_CHECKING:
     from lab.production.run_journal import RunEnded, RunJournal, is_run, replayed_run
     from lab.production.run_options import RunOptions, begun, kept_task
     from lab.production.run_options import gone_on as run_gone_on
-    from lab.production.sequencing_job import SequencingOptions, sequence_named
     from lab.seat.language_model import language_models
     from lab.seat.lesson_seat import LessonSeat
     from lab.seat.page.finding_page import FindingPage
     from lab.seat.page.teaching_page import SeatPage
     from lab.seat.run_progress import RunProgress
+    from lab.seat.team import Team
     from lab.seat.terminal.console_app import OperatorConsole
     from lab.seat.terminal.console_view import PlainConsole
     from lab.seat.terminal.line_reader import default_reader
@@ -71,6 +78,7 @@ if TYPE_CHECKING:
     from lab.studies import STUDIES, Study, carried_out, run_study, study_of
     from lab.studies.compared import Compared, compared
     from lab.studies.leaderboard import draw_board, leaderboard
+    from lab.studies.people_report import people_compared
     from lab.studies.runner import Job
     from lab.studies.tuning import FILE, Tuning, tuned
     from lab.tasks.cell_file import CellFile, toml_of
@@ -141,15 +149,28 @@ if TYPE_CHECKING:
     from lab.workers import Workers
 
 TABLE = {
-    "lab.advice.advisors": ("AdvisorName", "ADVISORS", "MODEL", "split_praise"),
+    "lab.advice.advisors": ("AdvisorName", "ADVISORS", "MODEL", "PAGE_OF", "split_praise"),
+    "lab.advice.answer_times": ("AnswerTimes",),
     "lab.advice.entries": ("Read", "read_journal"),
     "lab.advice.panel": ("ASKED", "DECISIONS"),
     "lab.api.scenes": ("SceneRequest as SceneAsked", "seen"),
     "lab.audit.audit": ("audit", "kept_evidence"),
+    "lab.classroom.class_lesson": (
+        "ADVISORS as PUPILS",
+        "check_lesson",
+        "ClassLesson",
+        "module_of",
+        "name_of",
+        "ORDER as ORDER_LESSON",
+        "order_lesson_named",
+    ),
+    "lab.classroom.class_report": ("write_report",),
     "lab.classroom.class_server": ("ClassServer",),
     "lab.classroom.code_picture": ("code_text",),
+    "lab.classroom.export": ("export", "exported"),
     "lab.classroom.holding": ("attend", "begun_words", "closing", "place_of"),
-    "lab.classroom.roster": ("ADVISORS as PUPILS", "Roster"),
+    "lab.classroom.roster": ("Roster",),
+    "lab.classroom.study": ("Study as StudyWithPeople",),
     "lab.export": ("FORMATS",),
     "lab.export.commands": ("Path as Lines",),
     "lab.export.program": ("Options", "POSITIONS", "Program"),
@@ -170,15 +191,16 @@ TABLE = {
     "lab.production.operation.commands": ("Done", "pace"),
     "lab.production.operation.desk": ("Desk", "RunDesk"),
     "lab.production.operation.operation": ("Operation",),
+    "lab.production.order_session": ("sequenced",),
     "lab.production.publication": ("CARD", "publish", "write_card"),
     "lab.production.report": ("write_files",),
     "lab.production.run": ("remember", "run as run_task"),
     "lab.production.run_advice": ("RunAdvice",),
     "lab.production.run_journal": ("is_run", "replayed_run", "RunEnded", "RunJournal"),
     "lab.production.run_options": ("begun", "kept_task", "gone_on as run_gone_on", "RunOptions"),
-    "lab.production.sequencing_job": ("sequence_named", "SequencingOptions"),
     "lab.seat.language_model": ("language_models",),
     "lab.seat.lesson_seat": ("LessonSeat",),
+    "lab.seat.team": ("Team",),
     "lab.seat.page.finding_page": ("FindingPage",),
     "lab.seat.page.teaching_page": ("SeatPage",),
     "lab.seat.run_progress": ("RunProgress",),
@@ -202,6 +224,7 @@ TABLE = {
     "lab.studies": ("carried_out", "run_study", "STUDIES", "Study", "study_of"),
     "lab.studies.compared": ("Compared", "compared"),
     "lab.studies.leaderboard": ("draw_board", "leaderboard"),
+    "lab.studies.people_report": ("people_compared",),
     "lab.studies.runner": ("Job",),
     "lab.studies.tuning": ("FILE", "tuned", "Tuning"),
     "lab.tasks.cell_file": ("CellFile", "toml_of"),

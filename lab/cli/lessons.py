@@ -1,10 +1,9 @@
 """The shared code of the commands that teach: the seat, the teacher, and the notices of a kept session."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from lab.cli import deferred
 from lab.cli.output import complain, console
@@ -14,9 +13,18 @@ from lab.files import is_file
 
 @contextmanager
 def lesson_seat(
-    names: Sequence[str], *, page: bool = False, port: int = 0, wait_s: float | None = None, plain: bool = False
+    names: Sequence[str],
+    *,
+    page: bool = False,
+    port: int = 0,
+    wait_s: float | None = None,
+    plain: bool = False,
+    times: bool = False,
 ) -> Iterator["deferred.LessonSeat"]:
-    """The seat of a command's lessons: the progress lines, and on request the prompt, the page and language models."""
+    """The seat of a command's lessons: the progress lines, and on request the prompt, the page and language models.
+
+    times: whether the times of people's answers are kept beside their journals.
+    """
     names = [deferred.split_praise(name)[0] for name in names]
     progress, asked = deferred.RunProgress(console()), [name for name in names if name.startswith(deferred.MODEL)]
     models = deferred.language_models(asked) if asked else {}
@@ -27,16 +35,24 @@ def lesson_seat(
             progress.console.print(f"page: {shown.url}\nfrom another machine: {shown.hint}", soft_wrap=True)
             if not {"web", "terminal"} & {*names}:
                 shown.asks_nobody()
+        several = [name for name in names if name.startswith(deferred.PAGE_OF)]
+        pages = {name: stack.enter_context(deferred.SeatPage(wait_s=wait_s)) for name in several}
+        for name, one in pages.items():
+            progress.console.print(f"page of {name.removeprefix(deferred.PAGE_OF)}: {one.url}", soft_wrap=True)
+        team = stack.enter_context(deferred.Team(pages)) if pages else None
         prompt = deferred.TeachingPrompt(progress.console, plain=plain) if "terminal" in names else None
-        seat = deferred.LessonSeat(progress, prompt, shown, models)
+        kept = deferred.AnswerTimes() if times else None
+        if kept is not None:
+            stack.callback(kept.close)
+        seat = deferred.LessonSeat(progress, prompt, shown, models, team, kept)
         stack.callback(seat.clear_scene)
         try:
             yield seat
             for model in models.values():
                 progress.console.print(str(model), soft_wrap=True)
         except LabError as error:
-            if shown is not None:
-                shown.finished(str(error))
+            for one in (*([] if shown is None else [shown]), *pages.values()):
+                one.finished(str(error))
             raise
 
 
@@ -56,40 +72,6 @@ def teacher_of(
     return deferred.Teacher(box, advising, options.seed, seat.hear)
 
 
-def sequenced(
-    kept: "deferred.OrderSession",
-    people: "Mapping[str, deferred.Ask]",
-    seat: "deferred.LessonSeat",
-    toolbox: str | None,
-    files: dict[str, Path],
-) -> dict[str, Any]:
-    """The document of a session of `lab sequence`; people: who is asked, by names such as "terminal"; files: its pictures."""
-    options = kept.options
-    wanted = deferred.SequencingOptions(
-        method=options.method,
-        episodes=options.episodes,
-        objective=options.objective,
-        sessions=options.sessions,
-        seed=options.seed,
-        stochastic=options.stochastic,
-        advisor=options.asked,
-        gate=options.gate,
-        people=people,
-        keep=kept.keep,
-        parts=options.parts,
-        durations=kept.durations(),
-        layout=options.beside.layout,
-        robots=options.robots,
-        policy=None if options.policy is None else Path(options.policy),
-        seconds=options.seconds,
-        gap=options.gap,
-        practice=options.practice,
-        keep_policy=options.keep_policy,
-    )
-    teacher = teacher_of(toolbox, deferred.LessonOptions(advisors=deferred.DEFAULT_ADVISORS, seed=options.seed), seat)
-    return deferred.sequence_named(options.task, options.case, options.toasts, wanted, teacher=teacher, files=files)
-
-
 def _say_cut(read: "deferred.Read") -> None:
     complain(f"journal '{read.path}': its last line was cut off and is left out: {read.cut[:60]!r}")
 
@@ -99,6 +81,8 @@ def say_read(kept: "deferred.KeptSession | deferred.OrderSession", where: str) -
     assert kept.read is not None
     if kept.read.cut:
         _say_cut(kept.read)
+    for line in kept.notes:
+        complain(f"session '{kept.read.path.parent}': {line}")
     options = kept.options
     named: list[object] = [getattr(options, "subtask", None), options.task]
     if str(named[0]).startswith("gym:"):

@@ -87,6 +87,13 @@ Wait = Annotated[
         "--wait", min=1.0, help="Seconds to wait for an answer of the advisor web; then the learner goes on alone."
     ),
 ]
+Times = Annotated[
+    bool,
+    typer.Option(
+        "--times",
+        help="Also keep when and how each answer was given, and what was seen, in times.jsonl of the session.",
+    ),
+]
 TrustModule = Annotated[
     list[str] | None,
     typer.Option(

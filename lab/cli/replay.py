@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from lab.cli import deferred
-from lab.cli.lessons import lesson_seat, say_read, sequenced
+from lab.cli.lessons import lesson_seat, say_read, teacher_of
 from lab.cli.options import Json, Own, Plain, Port, ToolboxPlace, TrustModule
 from lab.cli.output import complain, console, end, show
 from lab.cli.view import replay_page, serve
@@ -136,8 +136,10 @@ def _replayed(kept: "deferred.OrderSession", seat: "deferred.LessonSeat", toolbo
     def nobody(request: "deferred.Request") -> int | None:
         raise KeyboardInterrupt
 
+    people = dict.fromkeys(kept.options.advisors, nobody)
+    lessons = deferred.LessonOptions(advisors=deferred.DEFAULT_ADVISORS, seed=kept.options.seed)
     try:
-        stopped = sequenced(kept, dict.fromkeys(kept.options.advisors, nobody), seat, toolbox, files={})["interrupted"]
+        stopped = deferred.sequenced(kept, people, teacher_of(toolbox, lessons, seat))["interrupted"]
     except KeyboardInterrupt:  # no order was found before
         stopped = True
     if stopped and (kept.journal is None or kept.journal.folding):  # stopped by Ctrl-C, not by the end of the journal

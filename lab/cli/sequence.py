@@ -8,7 +8,7 @@ import typer
 
 from lab.cli import deferred
 from lab.cli.families import offers
-from lab.cli.lessons import lesson_seat, say_read, sequenced, teacher_of
+from lab.cli.lessons import lesson_seat, say_read, teacher_of
 from lab.cli.options import (
     Json,
     MethodName,
@@ -213,7 +213,8 @@ def sequence(
         say_read(kept, "--resume")
     try:
         with lesson_seat(kept.options.advisors, page=page, port=port, wait_s=wait, plain=plain) as seat, seat.progress:
-            document = sequenced(kept, seat.people(), seat, toolbox, files)
+            lessons = deferred.LessonOptions(advisors=deferred.DEFAULT_ADVISORS, seed=kept.options.seed)
+            document = deferred.sequenced(kept, seat.people(), teacher_of(toolbox, lessons, seat), files)
     except KeyboardInterrupt as stopped:
         if kept.journal is None:
             raise

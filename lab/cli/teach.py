@@ -20,6 +20,7 @@ from lab.cli.options import (
     Port,
     Seed,
     ShowPage,
+    Times,
     ToolboxPlace,
     TrustModule,
     Wait,
@@ -92,6 +93,7 @@ def teach(
     plain: Plain = False,
     seed: Seed = 0,
     toolbox: ToolboxPlace = None,
+    times: Times = False,
     out: Annotated[
         Path | None,
         typer.Option("--out", help="Folder for the session's journal, receipt, learning curve (and value map)."),
@@ -113,6 +115,7 @@ def teach(
                 "--port": port,
                 "--wait": wait,
                 "--plain": plain,
+                "--times": times,
             }
         )
     who = (tuple(advisor or ()), asked, decide)
@@ -133,7 +136,7 @@ def teach(
     folder = out if kept is None else kept.folder
     if folder is not None:
         deferred.check_out(folder)
-    with lesson_seat(options.advisors, page=page, port=port, wait_s=wait, plain=plain) as seat:
+    with lesson_seat(options.advisors, page=page, port=port, wait_s=wait, plain=plain, times=times) as seat:
         teacher = teacher_of(toolbox, options, seat)
         teacher.toolbox.check()
         if peers is not None or peer_tasks:

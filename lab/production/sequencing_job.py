@@ -157,23 +157,44 @@ def named_cell(
     Raises BadInput for a world and what does not fit its file.
     """
     wanted = wanted.by_policy()
+    loaded, case = _loaded(name, case, wanted, toolbox or teacher.toolbox)
+    if isinstance(loaded, CellFile):
+        cell, chance = ordered_cell(loaded, case, toasts), loaded.chance()
+    else:
+        cell, chance = measured_cell(loaded, toasts, wanted, teacher), Chance()
+    check_objective(wanted.objective or loaded.sequencing.objective, cell)
+    return NamedCell(loaded.name, cell, loaded.sequencing, chance)
+
+
+def check_named(name: str, case: str | None, toasts: int | None, wanted: SequencingOptions, toolbox: Toolbox) -> None:
+    """Raises BadInput for what `named_cell` refuses before it measures anything."""
+    wanted = wanted.by_policy()
+    loaded, case = _loaded(name, case, wanted, toolbox)
+    objective = wanted.objective or loaded.sequencing.objective
+    if isinstance(loaded, CellFile):
+        check_objective(objective, ordered_cell(loaded, case, toasts))
+    else:
+        loaded.ordered(toasts, wanted.parts)
+        _check_due_times(objective)
+
+
+def _loaded(
+    name: str, case: str | None, wanted: SequencingOptions, toolbox: Toolbox
+) -> tuple[CellFile | Task, str | None]:
+    """The cell file or task of that name, and the case of it that is left to choose. Raises BadInput."""
     if case is not None and name == "toast":
         name, case = toast_case(case), None
     loaded, case = load_beside(name, InstanceRequest(wanted.layout, wanted.robots, case))
     if isinstance(loaded, GridWorld):
         raise BadInput(f"{name}: it is a world, there is nothing to sequence: learn it with lab teach {name}")
-    _check_names(wanted, loaded.sequencing, toolbox or teacher.toolbox)
+    _check_names(wanted, loaded.sequencing, toolbox)
     if isinstance(loaded, CellFile):
         if wanted.parts is not None:
             raise BadInput(f"--parts {wanted.parts}: '{loaded.name}' is a cell: give its order with --case or --toasts")
-        cell, chance = ordered_cell(loaded, case, toasts), loaded.chance()
-    else:
-        if case is not None:
-            which = "toast has I, II and III, a cell its orders"
-            raise BadInput(f"case '{case}' (--case): task '{name}' has none; {which}")
-        cell, chance = measured_cell(loaded, toasts, wanted, teacher), Chance()
-    check_objective(wanted.objective or loaded.sequencing.objective, cell)
-    return NamedCell(loaded.name, cell, loaded.sequencing, chance)
+    elif case is not None:
+        which = "toast has I, II and III, a cell its orders"
+        raise BadInput(f"case '{case}' (--case): task '{name}' has none; {which}")
+    return loaded, case
 
 
 def _check_names(wanted: SequencingOptions, settings: Sequencing, toolbox: Toolbox) -> None:
@@ -212,14 +233,18 @@ def ordered_cell(file: CellFile, case: str | None, toasts: int | None) -> Cell:
 
 def measured_cell(task: Task, toasts: int | None, wanted: SequencingOptions, teacher: Teacher) -> Cell:
     """The cell of a task, once its skills are learned and their durations measured."""
-    objective = wanted.objective or task.sequencing.objective
-    if objective in WITH_DUE_TIMES:
-        raise BadInput(f"objective '{objective}' (--objective) needs due times, and a task has none: use a cell file")
+    _check_due_times(wanted.objective or task.sequencing.objective)
     if wanted.durations is not None:
         order = task.ordered(toasts, wanted.parts)
         skills = deferred.SkillSet.of(task, order)
         return deferred.cell_of(task, deferred.Durations.from_json(wanted.durations, skills), order)
     return deferred.teach_all(deferred.prepare(task, task.ordered(toasts, wanted.parts), teacher.seed), teacher).cell
+
+
+def _check_due_times(objective: str) -> None:
+    """Raises BadInput for an objective that needs due times, for a task."""
+    if objective in WITH_DUE_TIMES:
+        raise BadInput(f"objective '{objective}' (--objective) needs due times, and a task has none: use a cell file")
 
 
 def sequence_cell(

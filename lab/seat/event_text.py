@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import Literal
 
+from lab.advice.advisors import shown_name
 from lab.errors import counted
 from lab.learning.session_events import (
     AdviceEnded,
@@ -112,7 +113,7 @@ class SessionText:
                 return self._disagreed(event, mdp)
             case AdvisorDropped() | AdvisorReadmitted():
                 is_lost = isinstance(event, AdvisorDropped)
-                heard = f"{event.advisor} is heard {'no more' if is_lost else 'again'} (trust {percent(event.trust)})"
+                heard = f"{shown_name(event.advisor)} is heard {'no more' if is_lost else 'again'} (trust {percent(event.trust)})"
                 return Told(f"Episode {event.episode}: {heard}: {event.why}.", "lost" if is_lost else "good")
         return None
 
@@ -142,8 +143,8 @@ class SessionText:
         def named(action: int) -> str:
             return f"move {action}" if mdp is None else self.named(mdp, action)
 
-        said = ", ".join(f"{who} says {named(action)}" for who, action in event.said)
-        followed = [who for who, action in event.said if action == event.followed]
+        said = ", ".join(f"{shown_name(who)} says {named(action)}" for who, action in event.said)
+        followed = [shown_name(who) for who, action in event.said if action == event.followed]
         whom = f"it follows {' and '.join(followed)}" if followed else f"it goes {named(event.followed)}"
         return Told(f"Step {event.step} at {where}: {said}; {whom}.", "note")
 

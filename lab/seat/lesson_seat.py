@@ -1,11 +1,13 @@
 """The seat of a lesson: passes its events to progress lines, terminal and page, and its questions to the person there."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
+from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from lab.advice.answer_times import AnswerTimes
 from lab.advice.entries import Answer, Praise
 from lab.advice.journal import Undo
 from lab.advice.panel import Panel
@@ -18,6 +20,7 @@ from lab.seat.replay_pace import ReplayPace
 from lab.seat.run_progress import RunProgress
 from lab.seat.spoken_answers import SpokenAnswers
 from lab.seat.terminal.prompt import TeachingPrompt
+from lab.seat.timed_answers import TimedAsk
 from lab.teaching.events import AdvisorGathered, Event, LessonBegan, LessonEvent, QuestionAnswered, ScenePrepared
 from lab.teaching.kept_session import known_values, receipt_of
 
@@ -25,6 +28,7 @@ if TYPE_CHECKING:
     from lab.seat.language_model import LanguageModel
     from lab.seat.lesson_scene import LessonScene
     from lab.seat.page.teaching_page import SeatPage
+    from lab.seat.team import Team
 
 WORTH_S = 2.0  # least time between two receipts of one lesson
 PAGE_S = 30.0  # time that a replay waits for a browser
@@ -63,7 +67,8 @@ class LessonSeat:
     """Passes events to progress, prompt and page, and asks the person at one of them.
 
     The page also shows the scene, with the robot in the state of the question. `prompt`, `page`: None for a seat without.
-    models: the language models that are asked, by the name of the advisor.
+    models: the language models that are asked, by the name of the advisor. team: several people with a page each; all pages show
+    the same. times: where the times of people's answers are kept.
     """
 
     def __init__(
@@ -72,7 +77,11 @@ class LessonSeat:
         prompt: TeachingPrompt | None,
         page: "SeatPage | None",
         models: "Mapping[str, LanguageModel]" = MappingProxyType({}),
+        team: "Team | None" = None,
+        times: AnswerTimes | None = None,
     ) -> None:
+        self._team = team
+        self._pages = (*([] if page is None else [page]), *([] if team is None else team.pages.values()))
         self.progress, self._prompt, self.page, self.models = progress, prompt, page, models
         self._scene: LessonScene | None = None
         self._scene_of: Problem | None = None
@@ -80,6 +89,7 @@ class LessonSeat:
         self._pace: ReplayPace | None = None  # of a replay
         self._asked_here = False  # whether the last question went to somebody here, and was shown
         self._shown_s = 0.0  # when the page last showed a question that goes elsewhere
+        self._times = times
         self._lesson: LessonBegan | None = None
         self._panel: Panel | None = None
         self._values: tuple[object, FloatArray | None] = (None, None)  # a problem and its optimal values
@@ -89,8 +99,9 @@ class LessonSeat:
 
     def hear(self, event: Event) -> None:
         """Pass an event to progress, prompt and page; repeated events go to the page only, except in a replay."""
-        if self.page is not None and not isinstance(event, QuestionAnswered):
-            self.page.hear(event)
+        if not isinstance(event, QuestionAnswered):
+            for page in self._pages:
+                page.hear(event)
         for model in self.models.values():
             model.hear(event)
         match event:
@@ -103,6 +114,8 @@ class LessonSeat:
                 self._about(event.plan.problem)
             case AdvisorGathered():
                 self._panel = event.advisor if isinstance(event.advisor, Panel) else None
+                if self._team is not None:
+                    self._team.silent = self._silent
             case ScenePrepared():
                 self._place = event.scene
                 self._show_scene(event.problem)
@@ -116,21 +129,22 @@ class LessonSeat:
         skill = skill_of(self._place, problem.name)
         if self._prompt is not None:
             self._prompt.about(skill)
-        if self.page is not None:
-            self.page.about(skill)
+        for page in self._pages:
+            page.about(skill)
 
     def _hear_session(self, event: LessonEvent) -> None:
         if event.is_new or self._pace is not None:
             self.progress.hear(event)
             if self._prompt is not None:
                 self._prompt.hear(event)
-        if self.page is not None and isinstance(event.event, EpisodeEnded):
+        if self._pages and isinstance(event.event, EpisodeEnded):
             if self._panel is not None:
-                self.page.members(self._panel.standing())
+                for page in self._pages:
+                    page.members(self._panel.standing())
             if event.event.guided and event.is_new:
-                self._show_worth(self.page)
+                self._show_worth()
 
-    def _show_worth(self, page: "SeatPage") -> None:
+    def _show_worth(self) -> None:
         """Show the receipt so far; only for people's answers, which are slow enough for it."""
         lesson = self._lesson
         if lesson is None or time.monotonic() - self._worth_s < WORTH_S:
@@ -141,19 +155,21 @@ class LessonSeat:
             self._values = (lesson.plan.problem, known_values(lesson.plan))
         worth = receipt_of(lesson.plan, lesson.journal, self._values[1])
         self._worth_s = time.monotonic()
-        page.receipt(worth.to_json() | {"lines": worth.lines()})
+        for page in self._pages:
+            page.receipt(worth.to_json() | {"lines": worth.lines()})
 
     def _show_answer(self, request: Request, action: Reply) -> None:
         """Show on the page a question that goes to somebody else, at most every SEEN_S; in a replay, show all."""
         asked_here, self._asked_here = self._asked_here, False
         if self._pace is not None:
             self._replay(request, action, self._pace)
-        elif self.page is not None and not asked_here:
+        elif self._pages and not asked_here:
             now_s = time.monotonic()
             if now_s - self._shown_s >= SEEN_S:
                 self._shown_s = now_s
                 self._show_state(request)
-                self.page.look(request)
+                for page in self._pages:
+                    page.look(request)
 
     def _replay(self, request: Request, action: Reply, pace: ReplayPace) -> None:
         """Show a question with its answer, until the next one is due."""
@@ -168,9 +184,9 @@ class LessonSeat:
 
     def lesson_over(self, document: Mapping[str, Any]) -> None:
         """The lesson, or its replay, is over: show the final receipt on the page."""
-        if self.page is not None:
-            self.page.receipt(document["receipt"])
-            self.page.finished("The lesson is over.")
+        for page in self._pages:
+            page.receipt(document["receipt"])
+            page.finished("The lesson is over.")
 
     # ---- questions
 
@@ -178,10 +194,17 @@ class LessonSeat:
         """The functions that ask people and language models, by the name of the advisor."""
         people: dict[str, Ask] = {**self.models}
         if self._prompt is not None:
-            people["terminal"] = SpokenAsk(self._ask_terminal, self._prompt.spoken)
+            people["terminal"] = self._timed("terminal", self._ask_terminal, self._prompt, dict)
         if self.page is not None:
-            people["web"] = SpokenAsk(self._ask_page, self.page.spoken)
+            people["web"] = self._timed("web", self._ask_page, self.page, self.page.shown)
+        for name, page in {} if self._team is None else self._team.pages.items():
+            people[name] = self._timed(name, partial(self._ask_team, name), page, page.shown)
         return people
+
+    def _timed(self, by: str, ask: Ask, way: "TeachingPrompt | SeatPage", shown: Callable[[], dict[str, Any]]) -> Ask:
+        """A function that asks a person, and keeps what they say, and on request the times."""
+        spoken = SpokenAsk(ask, way.spoken)
+        return spoken if self._times is None else TimedAsk(by, spoken, self._times, lambda: way.asking, shown)
 
     def _ask_terminal(self, request: Request) -> Reply:
         """The answer from the terminal; a page shows the question as well, and can answer it."""
@@ -212,12 +235,29 @@ class LessonSeat:
         self._show_state(request)
         return self.page.ask(request)
 
+    def _ask_team(self, name: str, request: Request) -> Reply:
+        assert self._team is not None
+        self._asked_here = True
+        self._set_scene(request)
+        self._show_state(request)
+        return self._team.ask(name, request)
+
+    def _silent(self) -> Collection[str]:
+        """The people of the team to whom a question about a step does not go."""
+        assert self._team is not None
+        if self._panel is None:
+            return ()
+        heard = self._panel.heard()
+        return [name for name in self._team.pages if name not in heard]
+
     # ---- the scene
 
     def _show_state(self, request: Request) -> None:
         """Move the robot of the page's scene to the state of the question."""
-        if self.page is not None and self._scene is not None:
-            self.page.update(self._scene.frame(request.state))
+        if self._pages and self._scene is not None:
+            frame = self._scene.frame(request.state)
+            for page in self._pages:
+                page.update(frame)
 
     def _set_scene(self, request: Request) -> None:
         """Set up the scene of a lesson at its first question in a run; questions on the order have no scene."""
@@ -228,13 +268,14 @@ class LessonSeat:
 
     def _show_scene(self, problem: Problem | None) -> None:
         self.clear_scene()
-        if self.page is None or problem is None:
+        if not self._pages or problem is None:
             return
         from lab.seat.lesson_scene import lesson_scene_of
 
         self._scene, self._scene_of = lesson_scene_of(self._place, problem), problem
         if self._scene is not None:
-            self.page.show(self._scene.bodies, self._scene.camera)
+            for page in self._pages:
+                page.show(self._scene.bodies, self._scene.camera)
 
     def clear_scene(self) -> None:
         """Remove the scene."""

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -17,6 +17,7 @@ from lab.files import json_of, read_limited
 from lab.sequencing.cell.cell import Cell
 from lab.tasks.instances import InstanceRequest
 from lab.tasks.record import write_whole
+from lab.teaching.kept_inputs import keep_inputs, read_inputs, replaced, version_lines
 from lab.teaching.kept_session import SessionInFolder, check_same, claimed, kept_journal, read_session
 from lab.teaching.lesson_options import SessionOptions, whole_path
 from lab.toolbox.registry import Toolbox
@@ -97,12 +98,16 @@ class OrderSession(SessionInFolder):
         *,
         read_only: bool = False,
         durations: Mapping[str, Any] | None = None,
+        out: Path | None = None,
     ) -> None:
-        """durations: for a new session of a run, those that the run plans with; they are stored beside the journal."""
+        """durations: for a new session of a run, those that the run plans with; they are stored beside the journal.
+
+        out: the folder of a new session, by default one in the toolbox.
+        """
         self.options: OrderSessionOptions = options
         self._durations = durations
         self.read = read
-        self._toolbox, self._read_only = toolbox, read_only
+        self._toolbox, self._read_only, self._out = toolbox, read_only, out
         self.folder = None if read is None else read.path.parent
 
     def durations(self) -> Mapping[str, Any] | None:
@@ -122,11 +127,12 @@ class OrderSession(SessionInFolder):
         signature, read = signature_of(cell, objective), self.read
         if read is None:
             name = f"order of {Path(self.options.task).stem}"
-            self.folder = claimed(self._toolbox, name, Path.mkdir)
+            self.folder = claimed(self._toolbox, name, Path.mkdir) if self._out is None else self._out
             if self._durations is not None:
                 write_whole(self.folder / DURATIONS, json.dumps(dict(self._durations), indent=1) + "\n")
             head = SessionEntry(self.options.to_json(), name, signature, __version__, command="sequence")
             self.journal = Journal.begin(self.folder, head)
+            keep_inputs(self.folder, named_files(self.options))
         elif read.session.signature != signature:
             raise BadInput(
                 f"session '{self.folder}': it is about '{read.session.problem}' ({read.session.signature[:8]}), and now the "
@@ -138,9 +144,24 @@ class OrderSession(SessionInFolder):
 
 
 def kept_order(folder: Path, where: str, toolbox: Toolbox, *, read_only: bool = False) -> OrderSession:
-    """A stored session of `lab sequence`. Raises BadInput for anything else."""
+    """A stored session of `lab sequence`. Raises BadInput for anything else.
+
+    A replay (`read_only`) stands on the session's own copies of files that are not here or were changed.
+    """
     read, options = read_session(folder, where, OrderSessionOptions)
-    return OrderSession(options, toolbox, read, read_only=read_only)
+    inputs = read_inputs(read.path.parent) if read_only else None
+    if inputs is None:
+        return OrderSession(options, toolbox, read, read_only=read_only)
+    copies, lines = replaced(read.path.parent, inputs, named_files(options))
+    kept = OrderSession(replace(options, **copies), toolbox, read, read_only=read_only)
+    kept.notes = lines + version_lines(inputs)
+    return kept
+
+
+def named_files(options: OrderSessionOptions) -> dict[str, str]:
+    """The files that the options of a session name, by option."""
+    named = {"task": options.task, "layout": options.layout, "policy": options.policy}
+    return {option: word for option, word in named.items() if word}
 
 
 def gone_on(given: OrderSessionOptions, folder: Path, toolbox: Toolbox) -> OrderSession:

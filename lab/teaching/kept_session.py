@@ -10,7 +10,7 @@ from pathlib import Path
 from shlex import quote
 from typing import Any, TypeVar
 
-from lab.advice.advisors import MODEL
+from lab.advice.advisors import MODEL, split_praise
 from lab.advice.entries import FILE, Read, SessionEntry, is_unbegun, line_of, read_journal
 from lab.advice.journal import Journal
 from lab.advice.receipt import Receipt, receipt
@@ -18,9 +18,13 @@ from lab.errors import BadInput, WorkFailed
 from lab.learning.environment import TableEnvironment
 from lab.learning.problem import Problem
 from lab.mdp import FloatArray
+from lab.skills import SKILLS
 from lab.tasks.record import write_whole
-from lab.teaching.lesson_options import LessonOptions, SessionOptions, recorded_whole
+from lab.tasks.task_file import names_file
+from lab.teaching.kept_inputs import code_lines, keep_inputs, kept_table, read_inputs, replaced, version_lines
+from lab.teaching.lesson_options import DEFAULT_TASK, LessonOptions, SessionOptions, recorded_whole
 from lab.teaching.lesson_plan import LessonPlan
+from lab.teaching.named_problems import PROBLEMS, is_named
 from lab.toolbox.folder_place import FolderPlace
 from lab.toolbox.names import BEGUN, SESSIONS, SUFFIX, default_address, slug
 from lab.toolbox.policy import Policy
@@ -36,10 +40,11 @@ class SessionInFolder:
     """The base class of sessions in folders, about a table or about an order.
 
     folder, journal: None before the session begins; plan: None for an order; read: the journal that was read, None for a new
-    session.
+    session; notes: lines about what a replay stands on.
     """
 
     options: SessionOptions
+    notes: Sequence[str] = ()
     folder: Path | None = None
     journal: Journal | None = None
     plan: LessonPlan | None = None
@@ -144,11 +149,39 @@ class NewSession(SessionInFolder):
             "" if plan.begins_from is None else plan.begins_from.name,
         )
         self.journal = Journal.begin(self.folder, head)
+        try:
+            keep_inputs(self.folder, named_files(self.options), *self._from_code(plan))
+        except BadInput:
+            self.journal.close()
+            raise
         if self._wanted is not None:
             target = self.folder.resolve()
             with suppress(BadInput):  # without a link the session is merely not listed
                 claimed(self._toolbox, problem.name, lambda place: place.symlink_to(target, target_is_directory=True))
         return self.journal
+
+    def _from_code(self, plan: LessonPlan) -> tuple[Problem | None, list[str], str]:
+        """(the problem if it comes from no file, names that may be those of own code, the module that is imported)."""
+        options = self.options
+        problem = plan.problem if not named_files(options) and options.view in (None, "full") else None
+        members = [options.subtask.partition(":")[0], plan.learner.learner, plan.gate.gate]
+        members += [part for name in options.advisors for part in (name, split_praise(name)[0])]
+        module = ""
+        if options.subtask.startswith("gym:"):
+            from lab.gym import parse_name
+
+            module, problem = parse_name(options.subtask, "SUBTASK").module, None
+        return problem, members, module
+
+
+def named_files(options: LessonOptions) -> dict[str, str]:
+    """The task, or the world, that the options of a lesson name, by option; {} if they name neither."""
+    name = options.subtask
+    if names_file(name):
+        return {"subtask": name}
+    if name.startswith("gym:") or (options.task is None and name not in SKILLS and is_named(name)):
+        return {}
+    return {"task": options.task or DEFAULT_TASK}
 
 
 def claimed(toolbox: Toolbox, name: str, make: Callable[[Path], None]) -> Path:
@@ -170,16 +203,25 @@ class KeptSession(SessionInFolder):
     """A stored session, to be resumed or replayed (`read_only`). Raises BadInput if there is none.
 
     where: the option that names it, for messages; trusted: the modules that the session may import: it may come from somebody
-    else, and importing a module runs its code.
+    else, and importing a module runs its code. In a replay, the folder's own copies are used where what was learned on is not
+    here or was changed: `notes` says so, and `table` is a problem whose code is not here.
     """
 
     options: LessonOptions
     read: Read
+    table: Problem | None = None
 
     def __init__(self, folder: Path, where: str, *, read_only: bool = False, trusted: Sequence[str] = ()):
         self.read, self.options = read_session(folder, where, LessonOptions)
         self.folder: Path = self.read.path.parent
         self._read_only, self.where, self.trusted = read_only, where, trusted
+        inputs = read_inputs(self.folder) if read_only else None
+        if inputs is not None:
+            copies, self.notes = replaced(self.folder, inputs, named_files(self.options))
+            self.options = replace(self.options, **copies)
+            if self.options.subtask.partition(":")[0] not in PROBLEMS:
+                self.table = kept_table(self.folder, inputs)
+            self.notes += code_lines(inputs, self.table is not None) + version_lines(inputs)
 
     def keep(self, plan: LessonPlan) -> Journal:
         """The journal, which answers up to its last entry. Raises BadInput if problem or settings have changed."""

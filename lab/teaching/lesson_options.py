@@ -18,6 +18,7 @@ from lab.tasks.task_file import names_file
 from lab.teaching.lesson_plan import MAX_SESSIONS
 
 DEFAULT_ADVISORS = ("expert",)
+DEFAULT_TASK = "toast"  # of sub-tasks
 Settings = TypeVar("Settings", bound=Learned)
 
 

@@ -80,6 +80,10 @@ class Lesson:
 class Interrupted(KeyboardInterrupt):
     """Ctrl-C ended a lesson; what was learned has been saved, and the text says so."""
 
+    def _render_traceback_(self) -> list[str]:
+        """The text alone, which a notebook shows in place of a traceback."""
+        return [str(self)]
+
 
 Keep = Callable[[LessonPlan], Journal]  # returns the journal of a lesson
 Trial = Callable[[Problem, Policy], str | None]  # tries a policy in physics; returns why it failed, or None

@@ -15,7 +15,7 @@ from lab.tasks.record import Learned
 from lab.tasks.task import TAUGHT_WITH, Order, Task
 from lab.tasks.task_file import load, names_of
 from lab.teaching.lesson import Subject
-from lab.teaching.lesson_options import LessonOptions
+from lab.teaching.lesson_options import DEFAULT_TASK, LessonOptions
 from lab.teaching.named_problems import PROBLEMS
 from lab.toolbox.policy import Policy
 from lab.view.plots import values_seen
@@ -39,7 +39,7 @@ class SkillSubject(Subject):
         """The skill that the options name, by its full name or its sub-task; task: default the one that they name."""
         if options.view is not None:
             raise BadInput(f"sight '{options.view}' (--sight): only a world has one, '{options.subtask}' is none")
-        task = task or load(options.task or "toast")
+        task = task or load(options.task or DEFAULT_TASK)
         given = options.toasts is not None or options.parts is not None
         order = task.ordered(options.toasts, options.parts) if given else task.fitting(TAUGHT_WITH)
         wanted = find_skill(SkillSet.of(task, order).skills, options.subtask)

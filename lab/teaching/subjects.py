@@ -1,10 +1,12 @@
 """The subjects of lessons, by name or object: worlds, skills, Gymnasium environments, tables, added problems; `lab.world`."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING
+
+from pydantic import ValidationError
 
 from lab.errors import BadInput, check_value
 from lab.learning.problem import Problem
@@ -115,9 +117,25 @@ def subject_of(options: LessonOptions, kept: "KeptSession | None" = None) -> Sub
         return GymSubject.of(options)
     if names_file(options.subtask):
         return WorldSubject.of(options)
+    if kept is not None and kept.table is not None:
+        return _kept_subject(options, kept, kept.table)
     if options.task is None and options.subtask not in SKILLS and is_named(options.subtask):
         return _named_subject(options)
     return SkillSubject.of(options)
+
+
+def _kept_subject(options: LessonOptions, kept: "KeptSession", problem: Problem) -> Subject:
+    """A problem whose code is not here, as the session's folder holds it, with the settings in its journal."""
+    head = kept.read.session
+    subject = TableSubject(replace(problem, name=head.problem))
+    try:
+        settings = Learned.model_validate({"learner": head.learner, "gate": head.gate})
+    except ValidationError:
+        raise BadInput(
+            f"journal '{kept.read.path}' ({kept.where}): its learner and gate are none of this lab"
+        ) from None
+    subject.settings = options.changed(settings)
+    return subject
 
 
 def _named_subject(options: LessonOptions) -> Subject:

@@ -21,6 +21,7 @@ from lab import files
 from lab.errors import BadInput, WorkFailed, unknown
 from lab.sim.frames import Body, Frame, Recording, Viewpoint
 from lab.view import deferred
+from lab.view.framing import NOWHERE, POLLING_SCRIPT, Framing
 from lab.view.keyframes import BodyMotion, KeyframeTrack, motions
 from lab.view.scene_data import Json, Story, describe, pack
 
@@ -29,7 +30,7 @@ GANTT_SCRIPT = HERE / "gantt.js"
 # meshcat's viewer, and dat.gui in it, insert style elements; nothing else may be inline when served
 SERVED = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src data: blob:; "
-    "connect-src 'self' ws://127.0.0.1:* ws://localhost:*; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    f"connect-src 'self' ws://127.0.0.1:* ws://localhost:*; base-uri 'none'; form-action 'none'; {NOWHERE}"
 )
 RULES = "default-src 'none'; img-src data: blob:; script-src 'unsafe-inline'; style-src 'unsafe-inline'"
 OFFLINE = f'<meta http-equiv="Content-Security-Policy" content="{RULES}">'
@@ -40,14 +41,22 @@ class LiveView:
 
     `port` 0 takes any free one. `replay`: serve this file of `replay_html` instead of a live page. Entering raises
     BadInput for a port that is taken or not allowed, and for a replay that cannot be read. The page is served only to
-    requests with the token in `url`. A page cannot slow the run down: a slow page skips frames, messages from it are
-    dropped unless there is a panel, and leaving the context never takes longer than about 3 s.
+    requests with the token in `url`. `framing`: the pages that may show it in a frame, by default none. A page cannot
+    slow the run down: a slow page skips frames, messages from it are dropped unless there is a panel, and leaving the
+    context never takes longer than about 3 s.
     """
 
     _panel: "deferred.ScenePanel | None" = None
 
-    def __init__(self, port: int = 0, *, title: str = "Teaching lab, live", replay: Path | None = None) -> None:
-        self._wanted, self._title, self._replay = port, title, replay
+    def __init__(
+        self,
+        port: int = 0,
+        *,
+        title: str = "Teaching lab, live",
+        replay: Path | None = None,
+        framing: Framing | None = None,
+    ) -> None:
+        self._wanted, self._title, self._replay, self._framing = port, title, replay, framing
         self._server: deferred.Server | None = None
         self._token = ""
         self._shown: dict[str, tuple[float, ...] | None] = {}
@@ -57,8 +66,8 @@ class LiveView:
         if self._replay is None:
             served = self._files()
         else:
-            served = {"": deferred.File(_read(self._replay).encode(), "text/html", f"{RULES}; frame-ancestors 'none'")}
-        self._server = deferred.Server(self._wanted, served, self._token, self._panel)
+            served = {"": deferred.File(_read(self._replay).encode(), "text/html", f"{RULES}; {NOWHERE}")}
+        self._server = deferred.Server(self._wanted, served, self._token, self._panel, self._framing)
         self._server.start()
         return self
 
@@ -68,7 +77,9 @@ class LiveView:
         self.close()
 
     def _files(self) -> "dict[str, deferred.File]":
-        brought = () if self._panel is None else self._panel.files
+        brought = [] if self._panel is None else [*self._panel.files]
+        if self._framing is not None and self._framing.polls:
+            brought.append(POLLING_SCRIPT)
         return page_files(self._title, brought, f"?token={self._token}")
 
     @property

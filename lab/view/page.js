@@ -194,7 +194,9 @@ function keepUp(steps) {
 }
 
 function follow(pause = 300) {
-  const socket = new WebSocket(new URL(`frames${location.search}`, location.href.replace(/^http/, "ws")));
+  const search = typeof classBar === "undefined" ? location.search : classBar.search; // class_bar.js, on the pages of a class
+  const socket = typeof PolledSocket === "undefined" // polling.js, behind a proxy that passes no websockets
+    ? new WebSocket(new URL(`frames${search}`, location.href.replace(/^http/, "ws"))) : new PolledSocket();
   socket.onopen = () => {
     pause = 300;
     if (panel) panel.connected((message) => socket.send(JSON.stringify(message)));
@@ -212,7 +214,7 @@ function follow(pause = 300) {
     if (panel && scene) panel.hasScene();
     if (panel && parts) panel.update(parts);
     if (panel && refusal) panel.refused(refusal);
-    if (told) classBar.show(told); // class_bar.js, on the pages of a class
+    if (told) classBar.show(told);
   };
   socket.onclose = ({ code, reason }) => {
     if (code === 1001 && reason) {

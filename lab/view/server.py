@@ -6,10 +6,10 @@ delays the run nor lets messages pile up. Messages from a page go to the panel, 
 
 import asyncio
 import secrets
-import socket
 import threading
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import AsyncIterator, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -17,7 +17,7 @@ from starlette.applications import Starlette
 from starlette.middleware import Middleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import HTTPConnection, Request
-from starlette.responses import PlainTextResponse, Response
+from starlette.responses import PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket
@@ -26,11 +26,14 @@ from uvicorn import Server as Uvicorn
 
 from lab.errors import BadInput, WorkFailed
 from lab.operating_system import keep_port
+from lab.view.framing import Framing
+from lab.view.polled_pages import PolledPages, PolledSocket
 from lab.view.server_page import (
     BACKLOG,
     PAUSE_S,
     LimitedConnection,
     LimitedSocket,
+    Listener,
     News,
     PageQueue,
     ScenePanel,
@@ -43,6 +46,7 @@ FLUSH_S, GRACE_S, STOP_S = 0.5, 1, 3.0
 POLL_S = 0.2  # interval at which the panel is asked for news
 READ_S = 0.005  # least interval between two messages from a page, against flooding
 MAX_PAGES = 32
+PART = 1 << 16  # bytes of a file that are sent at once
 MAX_MESSAGE = 1 << 16  # bytes; a longer one ends the connection
 NO_TOKEN = "This page needs the token of its address: open the whole link that the lab printed.\n"
 HEADERS = {
@@ -65,14 +69,21 @@ class File:
 class Server:
     """Serves `files` ("" is the page) to requests with the token; `send` and `wake` may be called from any thread.
 
-    Raises BadInput for a port that is taken or not allowed.
+    framing: the pages that may show this one in a frame; None: none. Raises BadInput for a port that is taken or not allowed.
     """
 
-    def __init__(self, port: int, files: Mapping[str, File], token: str, panel: ScenePanel | None = None) -> None:
+    def __init__(
+        self,
+        port: int,
+        files: Mapping[str, File],
+        token: str,
+        panel: ScenePanel | None = None,
+        framing: Framing | None = None,
+    ) -> None:
         self._socket = listening(port)
         self.port: int = self._socket.getsockname()[1]
         self.connected = threading.Event()
-        self._files, self._token, self._panel = files, token, panel
+        self._files, self._token, self._panel, self._framing = files, token, panel, framing
         self._pages: set[PageQueue] = set()
         self._opened = 0
         self._known = News()
@@ -122,7 +133,7 @@ class Server:
     async def _serve(self) -> None:
         self._loop, self._stopped = asyncio.get_running_loop(), asyncio.Event()
         self._loop.set_exception_handler(quiet_when_full)
-        server = Uvicorn(config_of(self._application()))
+        server = Uvicorn(config_of(self._application(), self._socket))
         serving = asyncio.create_task(server.serve(sockets=[self._socket]))
         polling = asyncio.create_task(self._poll())
         self._ready.set()
@@ -140,18 +151,22 @@ class Server:
         await asyncio.sleep(0)
 
     def _application(self) -> Starlette:
+        framing = self._framing or Framing(())
         guards = [
-            Middleware(TrustedHostMiddleware, allowed_hosts=HOSTS, www_redirect=False),
-            Middleware(_Guard, self._token),
+            Middleware(TrustedHostMiddleware, allowed_hosts=[*HOSTS, *framing.hosts], www_redirect=False),
+            Middleware(_Guard, self._token, framing.origin),
         ]
-        routes = [Route("/{name}", self._file), Route("/", self._file), WebSocketRoute("/frames", self._page)]
+        polled = PolledPages(self._serve_page, self._full).routes() if framing.polls else ()
+        routes = [*polled, Route("/{name}", self._file), Route("/", self._file), WebSocketRoute("/frames", self._page)]
         return Starlette(routes=routes, middleware=guards)
 
     async def _file(self, request: Request) -> Response:
         file = self._files.get(request.path_params.get("name", ""))
         if file is None:
             return PlainTextResponse("There is no such page.\n", 404)
-        return Response(file.content, headers={"Content-Security-Policy": file.policy}, media_type=file.kind)
+        return answer_of(
+            replace(file, policy=file.policy if self._framing is None else self._framing.policy(file.policy))
+        )
 
     async def _poll(self) -> None:
         """Poll the panel for news that nobody announced with `wake`."""
@@ -160,12 +175,19 @@ class Server:
             if self._pages and self._panel is not None and self._panel.stirred():
                 self._wake()
 
+    def _full(self) -> str:
+        """Why no further page is served; "" if it is."""
+        return f"{MAX_PAGES} pages are open: close one.\n" if len(self._pages) >= MAX_PAGES else ""
+
     async def _page(self, socket: WebSocket) -> None:
-        """Serve one open page, from its first message to its last."""
-        if len(self._pages) >= MAX_PAGES:
-            await socket.send_denial_response(PlainTextResponse(f"{MAX_PAGES} pages are open: close one.\n", 503))
+        if why := self._full():
+            await socket.send_denial_response(PlainTextResponse(why, 503))
             return
         await socket.accept()
+        await self._serve_page(socket)
+
+    async def _serve_page(self, socket: WebSocket | PolledSocket) -> None:
+        """Serve one open page, from its first message to its last."""
         self._opened += 1
         page = PageQueue(self._opened, socket, self._panel)
         page.offer(self._known)
@@ -198,34 +220,56 @@ class Server:
 
 
 class _Guard:
-    """Rejects requests without the token, and websockets that another site's page has opened."""
+    """Rejects requests without the token, and websockets that another site's page has opened.
 
-    def __init__(self, app: ASGIApp, token: str) -> None:
-        self._app, self._token = app, token.encode()
+    origin: of a page behind a proxy, "" for none.
+    """
+
+    def __init__(self, app: ASGIApp, token: str, origin: str = "") -> None:
+        self._app, self._token, self._origin = app, token.encode(), origin
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         asked = HTTPConnection(scope)
         given = asked.query_params.get("token", "").encode()
         if not secrets.compare_digest(given, self._token):
             await PlainTextResponse(NO_TOKEN, 403)(scope, receive, send)
-        elif scope["type"] == "websocket" and not _from_here(asked):
+        elif scope["type"] == "websocket" and not _from_here(asked, self._origin):
             await PlainTextResponse("Another site's page may not connect.\n", 403)(scope, receive, send)
         else:
             await self._app(scope, receive, send)
 
 
-def _from_here(asked: HTTPConnection) -> bool:
-    """Whether the websocket was opened by a page of this server, or by a program that is no browser."""
+def _from_here(asked: HTTPConnection, proxied: str) -> bool:
+    """Whether the websocket was opened by a page of this server, or by a program that is no browser; proxied: see `_Guard`."""
     origin = asked.headers.get("origin")
-    return origin is None or urlsplit(origin)[:2] == ("http", asked.headers.get("host", ""))
+    if origin is None or (proxied and origin == proxied):
+        return True
+    return urlsplit(origin)[:2] == ("http", asked.headers.get("host", ""))
 
 
-def config_of(application: Any, **more: Any) -> Config:
+def answer_of(file: File) -> Response:
+    """The response with a file; a large one in parts, each sent once the one before is on its way."""
+    headers = {"Content-Security-Policy": file.policy}
+    if len(file.content) <= PART:
+        return Response(file.content, headers=headers, media_type=file.kind)
+
+    async def parts() -> AsyncIterator[bytes]:
+        for begin in range(0, len(file.content), PART):
+            yield file.content[begin : begin + PART]
+            await asyncio.sleep(0)  # others have their turn, and a cut connection is noticed
+
+    return StreamingResponse(
+        parts(), headers=headers | {"Content-Length": str(len(file.content))}, media_type=file.kind
+    )
+
+
+def config_of(application: Any, listener: Listener, **more: Any) -> Config:
     """The configuration of a server with the lab's limits and headers; more: of uvicorn, such as a certificate."""
+    http: Any = partial(LimitedConnection, knocking=listener.knocking)
     return Config(
         application,
         loop="asyncio",
-        http=LimitedConnection,
+        http=http,
         ws=LimitedSocket,
         backlog=BACKLOG,
         ws_max_size=MAX_MESSAGE,
@@ -243,12 +287,12 @@ def config_of(application: Any, **more: Any) -> Config:
     )
 
 
-def listening(port: int, address: str = ADDRESS, what: str = "the live view") -> socket.socket:
+def listening(port: int, address: str = ADDRESS, what: str = "the live view") -> Listener:
     """A socket that listens, by default on this computer alone; port 0 takes a free one.
 
     what: who wants it, for messages. Raises BadInput for a port that is taken or not allowed, and a wrong address.
     """
-    own = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    own = Listener()
     try:
         keep_port(own)
         own.setblocking(False)

@@ -2,22 +2,30 @@
 
 import asyncio
 import json
-from collections.abc import Mapping, Sequence
+import socket
+from collections import Counter
+from collections.abc import Mapping, MutableMapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from errno import EMFILE, ENFILE, ENOBUFS, ENOMEM
 from itertools import count
 from pathlib import Path
 from typing import Any, Protocol
 
-from starlette.websockets import WebSocket, WebSocketDisconnect
+from starlette.websockets import WebSocketDisconnect
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from websockets.frames import Frame
 
 from lab.operating_system import most_descriptors
 
 MOST = 128  # connections, and at most a quarter of the file descriptors
 IDLE_S = 10.0  # time within which a request must arrive
+MOST_LOOKS = 3  # IDLE_S within which a request must have been read and answered
 BACKLOG = 16  # connections accepted at once
+SLICE = 1 << 12  # bytes of a websocket that are taken in at once
+MOST_WAITING = 256  # messages of a page that nobody has asked for yet
+MOST_OTHERS, OTHERS_S = 200, 10.0  # pings, pongs and fragments of a page in so many seconds
 MOST_UNREAD = 1 << 22  # bytes of unread answers to a page's pings
 _NUMBERS = count()
 
@@ -28,28 +36,65 @@ def most_connections() -> int:
     return MOST if descriptors is None else max(4, min(MOST, descriptors // 4))
 
 
+class Listener(socket.socket):
+    """A listening socket that ends the oldest of the connections that have not begun to speak HTTP when there are too many.
+
+    Such are, over TLS, those that shake no hands. On Windows, where event loops accept in another way, all are left alone.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(socket.AF_INET, socket.SOCK_STREAM, socket.IPPROTO_TCP)  # named, asyncio sends at once
+        self.knocking: dict[Any, socket.socket] = {}  # by the other end's address, the oldest first
+
+    def accept(self) -> tuple[socket.socket, Any]:
+        """A new connection and its address. Raises OSError."""
+        connection, address = super().accept()
+        self.knocking[address] = connection
+        if len(self.knocking) > most_connections():
+            many = Counter(host for host, _ in self.knocking)
+            first = max(
+                self.knocking, key=lambda address: many[address[0]]
+            )  # of several the first one, which is the oldest
+            with suppress(OSError):
+                self.knocking.pop(first).shutdown(socket.SHUT_RDWR)
+        return connection, address
+
+
 class LimitedConnection(H11Protocol):
-    """A connection that has used only HTTP so far, with limits on number and idle time."""
+    """A connection that has used only HTTP so far, with limits on number, idle time and the time of a request.
+
+    knocking: those of a `Listener`.
+    """
 
     _asked_before: object = None
+    _looks = 0
     _cut = False
 
+    def __init__(self, *uvicorn: Any, knocking: dict[Any, Any] | None = None, **more: Any) -> None:
+        super().__init__(*uvicorn, **more)
+        self._knocking = {} if knocking is None else knocking
+
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Close an idle connection if there are too many."""
+        """If there are too many, close the oldest request of an address that has most of them."""
         super().connection_made(transport)
+        self._knocking.pop(transport.get_extra_info("peername"), None)
         self._number = next(_NUMBERS)
         self._look = self.loop.call_later(IDLE_S, self._still_there)
         there = [connection for connection in self.connections if not getattr(connection, "_cut", False)]
         if len(there) > most_connections():
-            waiting = [
-                connection for connection in there if isinstance(connection, LimitedConnection) and connection.waits
-            ]
-            min(waiting, key=lambda connection: connection._number, default=self).cut()
+            requests = [connection for connection in there if isinstance(connection, LimitedConnection)]
+            many = Counter(connection.address for connection in requests)
+            min(requests, key=lambda one: (-many[one.address], one._number)).cut()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget the closed connection."""
         self._look.cancel()
         super().connection_lost(exc)
+
+    @property
+    def address(self) -> str:
+        """The other end's."""
+        return self.client[0] if self.client else ""
 
     @property
     def waits(self) -> bool:
@@ -62,10 +107,14 @@ class LimitedConnection(H11Protocol):
         self.transport.abort()
 
     def _still_there(self) -> None:
-        """Close the connection if it has sent no request since the last check; pages have switched to a websocket by then."""
+        """Close the connection if it has sent no request since the last check, or if a request takes MOST_LOOKS of them.
+
+        Pages have switched to a websocket by then.
+        """
         if self not in self.connections:
             return
-        if self.waits and self.cycle is self._asked_before:
+        self._looks = self._looks + 1 if self.cycle is self._asked_before else 0
+        if self._looks >= (1 if self.waits else MOST_LOOKS):
             self.cut()
             return
         self._asked_before = self.cycle
@@ -73,12 +122,63 @@ class LimitedConnection(H11Protocol):
 
 
 class LimitedSocket(WebSocketsSansIOProtocol):
-    """A page's websocket; one that asks for signs of life and does not read them is cut off."""
+    """A page's websocket; one that browsers would not use like that is cut off.
+
+    Such are messages that pile up, pings and fragments without end, and answers that nobody reads. What comes is taken in
+    small parts, so that other pages wait for none of it.
+    """
+
+    def __init__(self, *uvicorn: Any, **more: Any) -> None:
+        super().__init__(*uvicorn, **more)
+        self._others, self._since_s = 0, 0.0  # frames that brought no message, and since when they are counted
+
+    def data_received(self, data: bytes) -> None:
+        """Take in what was received, until the connection is cut."""
+        for begin in range(0, len(data), SLICE):
+            if self.transport.is_closing():
+                return
+            super().data_received(data[begin : begin + SLICE])
+
+    def send_receive_event_to_app(self) -> None:
+        """Keep a message until it is asked for."""
+        super().send_receive_event_to_app()
+        if self.queue.qsize() > MOST_WAITING:
+            self.transport.abort()
+
+    def handle_cont(self, event: Frame) -> None:
+        """A further fragment of a message."""
+        self._count()
+        super().handle_cont(event)
+
+    def handle_pong(self, event: Frame) -> None:
+        """An answer to a ping."""
+        self._count()
+        super().handle_pong(event)
 
     def handle_ping(self) -> None:
         """Answered while somebody reads the answers."""
+        self._count()
         super().handle_ping()
         if self.transport.get_write_buffer_size() > MOST_UNREAD:
+            self.transport.abort()
+
+    def keepalive_timeout(self) -> None:
+        """The browser is not there any more: what it has not read is dropped."""
+        super().keepalive_timeout()
+        self.transport.abort()
+
+    async def send(self, message: Any) -> None:
+        """Send, or close; a browser that does not take the end is cut off."""
+        await super().send(message)
+        if message["type"] == "websocket.close":
+            self.loop.call_later(self.close_timeout, self.transport.abort)
+
+    def _count(self) -> None:
+        now_s = self.loop.time()
+        if now_s > self._since_s + OTHERS_S:
+            self._others, self._since_s = 0, now_s
+        self._others += 1
+        if self._others > MOST_OTHERS:
             self.transport.abort()
 
 
@@ -147,10 +247,23 @@ class ScenePanel(Protocol):
         """The JSON members that this page has not received yet; "" for none."""
 
 
+class PageSocket(Protocol):
+    """What is used of the connection of one page: a websocket, or what stands for one."""
+
+    async def send_text(self, data: str) -> None:
+        """Send a message."""
+
+    async def close(self, code: int = 1000, reason: str | None = None) -> None:
+        """Close the connection."""
+
+    async def receive(self) -> MutableMapping[str, Any]:
+        """The next message of the page, or its disconnection."""
+
+
 class PageQueue:
     """The pending news of one page, and the task that sends them; `last`: the connection is closed after them."""
 
-    def __init__(self, number: int, socket: WebSocket, panel: ScenePanel | None) -> None:
+    def __init__(self, number: int, socket: PageSocket, panel: ScenePanel | None) -> None:
         self.number, self.socket, self._panel = number, socket, panel
         self.wake, self.last = asyncio.Event(), False
         self.sending: asyncio.Task[None]

@@ -148,3 +148,30 @@ def test_the_settings_are_those_of_learner_and_gate() -> None:
     from lab.api.options import Settings
 
     assert [*Settings.__annotations__] == [*vars(LearnerSettings()), *vars(GateSettings())]
+
+
+def test_a_kept_lesson_is_the_command_s(request: pytest.FixtureRequest, tmp_path: Path) -> None:
+    command_line = request.getfixturevalue("lab")
+    words = ("world-1", "--advisor", "limited", "--gate", "always", "--episodes", "20", "--seed", "3")
+    command_line("teach", *words, "--toolbox", str(tmp_path / "box"), "--out", str(tmp_path / "a"))
+    lesson = lab.teach("world-1", advisor="limited", gate="always", episodes=20, seed=3, out=tmp_path / "b")
+    assert (tmp_path / "b/events.jsonl").read_bytes() == (tmp_path / "a/events.jsonl").read_bytes()
+    assert lesson.receipt == lesson.document["receipt"]["lines"]
+    assert command_line("replay", str(tmp_path / "b"), "--json").json["receipt"] == lesson.document["receipt"]
+    with pytest.raises(lab.BadInput, match="holds a session that is over"):
+        lab.teach("world-1", advisor="limited", out=tmp_path / "b")
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"advisor": right_then_down}, "out beside advisor"),
+        ({"alpha": 0.5}, "out beside alpha .*: a stored session holds the settings learner, gate, memory, episodes"),
+        ({"peers": 2, "advisor": None}, "out beside peers"),
+    ],
+)
+def test_what_a_journal_cannot_hold_is_refused(tmp_path: Path, given: dict[str, Any], said: str) -> None:
+    with pytest.raises(lab.BadInput, match=said):
+        lab.teach("world-1", out=tmp_path, **given)
+    with pytest.raises(lab.BadInput, match="out beside problem"):
+        lab.teach(lab.world(ROWS), out=tmp_path)

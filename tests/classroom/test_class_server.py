@@ -11,8 +11,12 @@ import pytest
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosedError, InvalidStatus
 
+from lab.advice.answer_times import read_times
+from lab.classroom import class_server
 from lab.classroom.class_place import Place
-from lab.classroom.class_server import WRONG, ClassServer
+from lab.classroom.class_server import ClassServer
+from lab.classroom.door import WRONG
+from lab.classroom.room import PupilPage, Room
 from lab.classroom.roster import Roster
 from lab.seat.lesson_seat import LessonSeat
 from lab.seat.run_progress import RunProgress
@@ -157,6 +161,7 @@ async def does(page: ClientConnection, **what: Any) -> None:
 
 
 def test_the_teacher_sees_pauses_hints_helps_and_goes_on(server: ClassServer) -> None:
+    server.roster.times = True
     said = join(server)
 
     async def seen() -> None:
@@ -194,6 +199,8 @@ def test_the_teacher_sees_pauses_hints_helps_and_goes_on(server: ClassServer) ->
 
     asyncio.run(seen())
     assert server.roster.pupils[0].lesson == 1
+    times = read_times(server.roster.folder / server.roster.pupils[0].folder / "lesson-1")
+    assert [time.seen["page"]["helped"] for time in times.values()] == [True]
 
 
 def test_a_finished_lesson_is_a_row_of_the_table_and_is_shown_again(server: ClassServer) -> None:
@@ -204,11 +211,51 @@ def test_a_finished_lesson_is_a_row_of_the_table_and_is_shown_again(server: Clas
     head, row = table.decode().splitlines()
     assert status == 200
     assert dict(zip(head.split(","), row.split(","), strict=True))["state"] == "over"
+    for name in ("report.html", "hand-outs.html"):
+        status, written = asked(server, f"/teacher/{name}{teacher(server).partition('/teacher/')[2]}")
+        assert (status, server.roster.pupils[0].name in written.decode()) == (200, True)
     server.stop()
     with ClassServer(Roster.read(server.roster.folder), Place()) as again:
         shown = at_page(again, page, lambda opened: until(opened, lambda news: news.get("seat", {}).get("receipt")))
         assert shown["seat"]["ended"]
         assert again.call(lambda: [row["state"] for row in again.room.rows()]) == ["over"]
+
+
+def test_a_lesson_that_ended_as_its_desk_was_killed_is_made_again_from_its_journal(server: ClassServer) -> None:
+    page = join(server)["page"]
+    at_page(server, page, taught)
+    at_page(server, teacher(server), lambda opened: until(opened, lambda news: news.get("rows")))
+    before = server.call(server.room.rows)
+    journal = server.room.folder(server.roster.pupils[0], 0) / "events.jsonl"
+    written = journal.read_bytes()
+    server.stop()
+    (journal.parent / "lesson.json").unlink()
+    with ClassServer(Roster.read(server.roster.folder), Place()) as again:
+        at_page(again, teacher(again), lambda opened: until(opened, lambda news: news.get("rows")))
+        assert again.call(again.room.rows) == before
+    assert journal.read_bytes() == written
+
+
+def test_a_pupil_gets_the_seat_back_when_help_ends_also_after_the_helping_page_was_closed(
+    tmp_path: Path, lesson: LessonOptions
+) -> None:
+    said: list[Json] = []
+
+    async def say(message: Any) -> None:
+        said.append(message)
+
+    async def helped_twice() -> None:
+        roster = Roster.new(tmp_path / "class", [lesson], 0, 3, False)
+        roster.join(roster.code)
+        room, page = Room(roster), PupilPage(1, say, say, say)
+        room.pages[1] = page
+        for page.sees_free in (True, False):  # the teacher's page was closed; it has the seat still
+            room.help(1, True)
+            room.help(1, False)
+        await room.end()
+
+    asyncio.run(helped_twice())
+    assert [message for message in said if "seat" in message] == [{"seat": "give"}, {"seat": "take"}, {"seat": "give"}]
 
 
 @pytest.mark.parametrize(
@@ -231,6 +278,31 @@ def test_a_wrong_wish_of_the_teacher_is_answered(server: ClassServer, message: s
     assert at_page(server, teacher(server), wished)["refusal"]
 
 
+def test_the_teacher_closes_the_door_and_takes_a_seat_away(server: ClassServer) -> None:
+    page = join(server)["page"]
+
+    async def swept() -> int | None:
+        async with connect(frames(server, teacher(server))) as desk, connect(frames(server, page)) as pupil:
+            await seated(pupil)
+            await does(desk, do="door", open=False)
+            await until(desk, lambda news: news.get("class", {}).get("open") is False)
+            await does(desk, do="remove", pupil=1)
+            assert (await until(desk, lambda news: news.get("gone")))["gone"] == [1]
+            await does(desk, do="hint", pupil=1, text="x")
+            assert "pupil 1" in (await until(desk, lambda news: news.get("refusal")))["refusal"]
+            return await code_of_closing(pupil)
+
+    assert asyncio.run(swept()) == 1001
+    assert asked(server, "/join", {"code": server.roster.code})[0] == 403
+    with pytest.raises(InvalidStatus):
+        at_page(server, page, question)
+    server.stop()
+    with ClassServer(Roster.read(server.roster.folder), Place()) as again:
+        assert again.call(again.room.tiles) == {}
+        assert join(again)["page"]
+        assert [*again.call(again.room.tiles)] == [2]
+
+
 # ---- who may not
 
 
@@ -247,14 +319,16 @@ def test_without_its_key_nothing_of_a_pupil_is_reached(server: ClassServer) -> N
         with pytest.raises(InvalidStatus) as refused:
             at_page(server, page, question)
         assert refused.value.response.status_code in (403, 404)
-    assert asked(server, "/teacher/class.csv")[0] == 403
+    for name in ("class.csv", "report.html", "hand-outs.html"):
+        assert asked(server, f"/teacher/{name}")[0] == 403
 
 
 def test_a_pupil_may_not_teach(server: ClassServer) -> None:
     key = join(server)["page"].partition("token=")[2]
     with pytest.raises(InvalidStatus):
         at_page(server, f"/teacher/?token={key}", question)
-    assert asked(server, f"/teacher/class.csv?token={key}")[0] == 403
+    for name in ("class.csv", "report.html", "hand-outs.html"):
+        assert asked(server, f"/teacher/{name}?token={key}")[0] == 403
 
 
 @pytest.mark.parametrize(
@@ -278,6 +352,27 @@ def test_codes_cannot_be_tried_one_after_the_other(server: ClassServer) -> None:
     states = [asked(server, "/join", {"code": f"wrong{n}"})[0] for n in range(WRONG + 2)]
     assert states == [403] * WRONG + [429] * 2
     assert asked(server, "/join", {"code": server.roster.code})[0] == 429
+
+
+def test_a_page_that_comes_and_goes_has_to_wait(server: ClassServer, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(class_server, "MOST_OPENED", 2)
+    page = join(server)["page"]
+    for _ in range(2):
+        at_page(server, page, question)
+    with pytest.raises(InvalidStatus) as refused:
+        at_page(server, page, question)
+    assert refused.value.response.status_code == 429
+
+
+def test_a_message_that_is_no_text_is_refused_and_the_page_stays(server: ClassServer) -> None:
+    async def said(page: ClientConnection) -> Json:
+        await seated(page)
+        await page.send(b"\0")
+        await until(page, lambda news: news.get("refusal"))
+        await page.send("{}")
+        return await until(page, lambda news: news.get("refusal"))
+
+    assert at_page(server, join(server)["page"], said)["refusal"]
 
 
 def test_another_site_and_another_host_are_refused(server: ClassServer) -> None:
@@ -313,3 +408,24 @@ def test_a_full_class_says_so(server: ClassServer) -> None:
         join(server)
     status, said = asked(server, "/join", {"code": server.roster.code})
     assert (status, "full" in json.loads(said)["error"]) == (409, True)
+
+
+def test_the_times_of_answers_are_kept_on_request(server: ClassServer) -> None:
+    server.roster.times = True
+
+    async def twice(opened: ClientConnection) -> Json:
+        for _ in range(2):
+            asks = await question(opened)
+            await answer(opened, asks, asks["own"])
+        return await question(opened)
+
+    at_page(server, join(server)["page"], twice)
+    folder = server.roster.folder / server.roster.pupils[0].folder / "lesson-1"
+    times = read_times(folder)
+    lines = [json.loads(line) for line in (folder / "events.jsonl").read_text().splitlines()]
+    assert [lines[number - 1]["kind"] for number in times] == ["answer", "answer"]
+    assert [(time.by, time.means) for time in times.values()] == [("web", "move")] * 2
+    assert [{**time.seen["page"], "sha256": ""} for time in times.values()] == [
+        {"episodes": 0, "notices": 0, "helped": False, "sha256": ""}
+    ] * 2
+    assert all(time.latency_s is not None for time in times.values())

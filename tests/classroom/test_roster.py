@@ -1,14 +1,16 @@
 """The roster of a class: who joins, by which name, and what is kept of it."""
 
 import json
+import stat
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lab.classroom.roster import FILE, LETTERS, NAME_LENGTH, Full, Pupil, Roster, clean_name, hash_of
+from lab.classroom.roster import FILE, LETTERS, NAME_LENGTH, Full, Pupil, Roster, StudyEntry, clean_name, hash_of
 from lab.errors import BadInput
+from lab.operating_system import WINDOWS
 from lab.teaching.lesson_options import LessonOptions
 
 
@@ -86,6 +88,47 @@ def test_a_pupil_goes_on_to_a_lesson_that_there_is(tmp_path: Path, lesson: Lesso
             made.move(number, wrong)
 
 
+def test_a_removed_pupil_has_no_key_and_leaves_the_name_to_another_one(tmp_path: Path, lesson: LessonOptions) -> None:
+    made = roster(tmp_path / "a", lesson, typed=True)
+    first, key = joined(made, "Eve")
+    made.remove(1)
+    assert made.of_key(key) is made.of_key("") is None
+    assert made.present == []
+    second, _ = joined(made, "Eve")
+    assert (second.number, second.name) == (2, first.name)
+    assert Roster.read(tmp_path / "a") == made
+    with pytest.raises(BadInput, match="pupil 3"):
+        made.remove(3)
+
+
+@pytest.mark.skipif(WINDOWS, reason="rights of POSIX")
+def test_nobody_else_reads_the_folder_of_a_class(tmp_path: Path, lesson: LessonOptions) -> None:
+    made = roster(tmp_path / "a", lesson)
+    assert stat.S_IMODE(made.folder.stat().st_mode) == 0o700
+
+
+def test_who_withdraws_leaves_a_number_and_the_next_one_gets_the_position(
+    tmp_path: Path, lesson: LessonOptions
+) -> None:
+    made = Roster.new(tmp_path / "a", [lesson], 0, 3, False)
+    made.study = StudyEntry("0" * 64)
+    assert [made.admit(f"key {n}", f"P0{n}")[1] for n in (1, 2, 3)] == [0, 1, 2]
+    with pytest.raises(Full):
+        made.admit("key 4")
+    made.retire(2)
+    assert made.of_key("key 2") is None
+    assert made.admit("key 4", "P04") == (Pupil(4, "P04", hash_of("key 4")), 1)
+    assert [pupil.number for pupil in made.present] == [1, 3, 4]
+    assert made.study.positions == [0, None, 2, 1]
+    assert Roster.read(tmp_path / "a") == made
+
+
+def test_a_class_that_is_no_study_is_kept_as_before(tmp_path: Path, lesson: LessonOptions) -> None:
+    made = roster(tmp_path / "a", lesson)
+    assert "study" not in json.loads((tmp_path / "a" / FILE).read_text())
+    assert made.study is None
+
+
 def test_a_class_is_never_written_over(tmp_path: Path, lesson: LessonOptions) -> None:
     roster(tmp_path / "a", lesson)
     with pytest.raises(BadInput, match="holds a class"):
@@ -101,6 +144,8 @@ def test_a_class_is_never_written_over(tmp_path: Path, lesson: LessonOptions) ->
         ("pupils", [{"number": 1, "name": "a", "key_hash": "", "lesson": 2}]),
         ("pupils", [{"number": 1}]),
         ("pupils", 3),
+        ("pupils", [{"number": n, "name": "a", "key_hash": "", "lesson": 0} for n in range(1, 5)]),
+        ("pupils", [{"number": n, "name": "a", "key_hash": "", "lesson": 0, "removed": True} for n in range(1, 902)]),
         ("lessons", [{"subtask": 5}]),
         ("lessons", "x"),
         ("lessons", []),
@@ -110,6 +155,8 @@ def test_a_class_is_never_written_over(tmp_path: Path, lesson: LessonOptions) ->
         ("most", 0),
         ("seed", -1),
         ("code", "../.."),
+        ("study", {"protocol_sha256": "x", "positions": [0]}),
+        ("study", {"protocol_sha256": 3}),
     ],
 )
 def test_a_damaged_class_is_refused_in_one_line(tmp_path: Path, lesson: LessonOptions, key: str, value: object) -> None:

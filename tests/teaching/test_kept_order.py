@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from lab.advice.entries import FILE
+from lab.files import tasks_folder
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
 WORDS = "toast --case I --toasts 3 --method srl --advisor terminal --gate always --episodes 3"
@@ -119,3 +120,15 @@ def test_stopped_in_its_first_episode_it_has_an_order_and_goes_on_too(lab: Lab) 
     stopped = advised(lab, "2", "quit")
     assert stopped.code == 130
     assert "the best order until then is above; go on with: lab sequence --resume " in stopped.err
+
+
+def test_it_is_shown_again_without_its_file(lab: Lab, tmp_path: Path) -> None:
+    cell = tmp_path / "mine.toml"
+    cell.write_text((tasks_folder() / "toast-case-1.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    words = f"{cell} --toasts 2 --method srl --advisor terminal --gate always --episodes 2"
+    folder = advised(lab, "1", "2", "auto", words=words).json["session"]
+    before = lab("replay", folder, "--json")
+    cell.unlink()
+    after = lab("replay", folder, "--json")
+    assert (after.code, after.json) == (0, before.json), after.err
+    assert f"'{cell}' is not here: the session's own copy is used" in after.err

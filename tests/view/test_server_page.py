@@ -1,5 +1,6 @@
 """What strangers without the token can take from the page's server: little, and not for long; open pages are not touched."""
 
+import asyncio
 import os
 import resource
 import socket
@@ -10,10 +11,12 @@ from typing import TYPE_CHECKING, Any
 from urllib.request import urlopen
 
 import pytest
+from uvicorn import Server as Uvicorn
 
 from lab.sim.frames import Body, Frame, Shape
 from lab.view import server_page
 from lab.view.meshcat import LiveView
+from lab.view.server import config_of, listening
 
 if TYPE_CHECKING:
     Opens = Callable[..., AbstractContextManager[Any]]
@@ -108,3 +111,64 @@ def test_pings_whose_answers_nobody_reads_end_the_connection(view: LiveView, mon
         pings = (b"\x89\xfd\0\0\0\0" + bytes(125)) * 1000  # masked with zeros
         with pytest.raises((ConnectionResetError, BrokenPipeError)):
             page.sendall(pings * 1000)  # 131 MB
+
+
+@pytest.mark.parametrize(
+    "frames",
+    [
+        b"\x89\x80\0\0\0\0" * 300,  # pings
+        b"\x8a\x80\0\0\0\0" * 300,  # pongs
+        b"\x01\x80\0\0\0\0" + b"\x00\x80\0\0\0\0" * 300,  # fragments of one message
+        b"\x81\x80\0\0\0\0" * 1000,  # messages faster than they are read
+    ],
+)
+def test_a_page_that_sends_what_no_browser_does_is_cut(view: LiveView, frames: bytes) -> None:
+    path = view.url.partition(str(view.port))[2].replace("/?", "/frames?")
+    ask = f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{view.port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+    with bare(view) as page:
+        page.sendall(f"{ask}Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n\r\n".encode())
+        assert page.recv(12) == b"HTTP/1.1 101"
+        page.sendall(frames)
+        while not is_cut(page):
+            pass
+
+
+def test_a_request_that_is_never_answered_is_cut(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server_page, "IDLE_S", 0.05)
+
+    async def never(scope: Any, receive: Any, send: Any) -> None:
+        await asyncio.Event().wait()
+
+    async def asked() -> bytes:
+        with listening(0) as listener:
+            server = Uvicorn(config_of(never, listener))
+            serving = asyncio.create_task(server.serve(sockets=[listener]))
+            reader, writer = await asyncio.open_connection(*listener.getsockname())
+            writer.write(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+            try:
+                return await reader.read()
+            except ConnectionResetError:
+                return b""
+            finally:
+                writer.close()
+                for task in server.server_state.tasks:
+                    task.cancel()
+                server.should_exit = True
+                await serving
+
+    assert asyncio.run(asyncio.wait_for(asked(), 30.0)) == b""
+
+
+def test_the_oldest_of_those_who_shake_no_hands_makes_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Four may knock at a time: of six the first two are ended."""
+    monkeypatch.setattr(server_page, "MOST", 4)
+    with ExitStack() as stack:
+        listener = stack.enter_context(listening(0))
+        listener.setblocking(True)
+        strangers = [
+            stack.enter_context(socket.create_connection(listener.getsockname(), timeout=30.0)) for _ in range(6)
+        ]
+        held = [stack.enter_context(listener.accept()[0]) for _ in strangers]
+        assert [is_cut(one) for one in strangers[:2]] == [True, True]
+        assert [*listener.knocking] == [one.getsockname() for one in strangers[2:]]
+        assert [one.getpeername() for one in held[2:]] == [*listener.knocking]

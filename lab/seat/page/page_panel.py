@@ -1,5 +1,6 @@
 """The panel of the teaching page, shared by two threads: the session's, which asks, and the server's, which serves pages."""
 
+import hashlib
 import json
 import threading
 import time
@@ -30,7 +31,9 @@ from lab.view.meshcat import GANTT_SCRIPT
 
 SLICE_EVERY_S = 0.1  # least time between two messages with a layer's values
 RUN_EVERY_S = 0.1  # least time between two messages with the status of a run
+MOST_LAYERS = 64  # whose values are kept, whatever numbers pages ask for
 SLICE_SHARE = 30  # computing a layer's values takes at most one part in so many of the time
+SEEN = ("curve", "standing", "notices", "members", "receipt")  # parts beside the question, of which a hash is kept
 CLOSED = PageAnswer(0, None, "closed")
 LISTEN_S = 0.2  # longest uninterrupted wait, so that Ctrl-C is noticed
 
@@ -47,6 +50,7 @@ class _Seen:
     refusal: str = ""
     held: str = ""
     run_due_s: float = 0.0
+    watches: bool = False
 
 
 class SeatPanel:
@@ -77,9 +81,11 @@ class SeatPanel:
         self.on_pace: Callable[[str], None] | None = None
         self.on_quit: Callable[[], None] | None = None
         self._answer: PageAnswer | None = None
+        self._helped = False  # whether the last answer came from a page that only watches by itself
         self._ended = False
         self._pages: dict[int, _Seen] = {}
-        self._texts: dict[str, tuple[int, str]] = {}  # part, or layer -> its version and its JSON
+        self._texts: dict[str, tuple[int, str]] = {}  # part -> its version and its JSON
+        self._layers: dict[int | None, tuple[int, str]] = {}  # the same of layers that pages have asked for
         self._stirred = 0
         self._late = False  # whether news were held back
         self._busy = ""  # the console's command under way at the last check
@@ -104,6 +110,27 @@ class SeatPanel:
                 self.known.changed("question")
             return waited
 
+    @property
+    def attended(self) -> bool:
+        """Whether a browser has the seat."""
+        with self.lock:
+            return self.chair.holder is not None
+
+    def skip(self) -> None:
+        """Answer the question with "skip" for whoever has the seat."""
+        with self.lock:
+            if (pending := self.known.pending) is not None:
+                self._answer, self.known.pending = PageAnswer(pending.number, None, "skip"), None
+                self.known.changed("question")
+                self.lock.notify_all()
+
+    def hurry(self, until_s: float) -> None:
+        """Show until when [s of the clock] the question waits."""
+        with self.lock:
+            if (pending := self.known.pending) is not None and pending.until_s is None:
+                self.known.pending = replace(pending, until_s=until_s)
+                self.known.changed("question")
+
     def wait(self, pending: Pending) -> PageAnswer | None:
         """The answer to a question, or CLOSED after the server has ended; None after the question's time."""
         with self.lock:
@@ -122,12 +149,27 @@ class SeatPanel:
             self._ended = True
             self.lock.notify_all()
 
+    def shown(self) -> dict[str, Any]:
+        """What is shown beside the question: the length of the curve, the number of notices, and a hash of the parts SEEN.
+
+        helped: whether the last answer came from a page that looks over the shoulder of the one that has the seat by itself.
+        """
+        with self.lock:
+            now = {part: PARTS[part](self.known, 0.0) for part in SEEN}
+        text = plain_json(now).encode()
+        return {
+            "episodes": now["curve"]["count"],
+            "notices": len(now["notices"]),
+            "helped": self._helped,
+            "sha256": hashlib.sha256(text).hexdigest(),
+        }
+
     # ---- called by the server's thread
 
     def joined(self, page: int, watches: bool = False) -> None:
         """A browser has opened the page; one that only watches neither counts nor gets the seat by itself."""
         with self.lock:
-            self._pages[page] = _Seen()
+            self._pages[page] = _Seen(watches=watches)
             if not watches:
                 self.chair.joined(page)
             self._count()
@@ -206,7 +248,7 @@ class SeatPanel:
             return ""
         assert isinstance(meant, PageAnswer)
         pending = self._checked(page, meant)
-        self._answer = meant
+        self._answer, self._helped = meant, self._pages[page].watches
         self.known.pending = None
         self.known.changed("question")
         self.lock.notify_all()
@@ -287,11 +329,12 @@ class SeatPanel:
         if now_s < seen.layer_due_s:
             self._late = True
             return None
-        key = f"layer {seen.layer}"
-        if self._texts.get(key, (-1, ""))[0] != version:
-            self._texts[key] = (version, plain_json(layer_of(self.known, seen.layer)))
+        if self._layers.get(seen.layer, (-1, ""))[0] != version:
+            if len(self._layers) >= MOST_LAYERS:
+                self._layers.clear()
+            self._layers[seen.layer] = (version, plain_json(layer_of(self.known, seen.layer)))
         seen.layer_version = version
-        text = self._texts[key][1]
+        text = self._layers[seen.layer][1]
         if text != "null":  # "no grid" is found out fast, and there may be a grid soon
             seen.layer_due_s = now_s + max(SLICE_EVERY_S, SLICE_SHARE * (time.monotonic() - now_s))
         return text

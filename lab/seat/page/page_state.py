@@ -189,6 +189,7 @@ class PageContent:
     members: list[Json] = field(default_factory=list)
     receipt: Json | None = None
     ended: str = ""
+    waits_for: list[str] = field(default_factory=list)  # the names of others who are asked as well
     asks: bool = True  # whether questions of a lesson may be answered here
     console: Console | None = None  # of a run that is operated here
     replay: Json | None = None  # of a replay: its pace, and the last answer
@@ -294,6 +295,7 @@ PARTS: dict[str, Callable[[PageContent, float], Any]] = {
     "members": lambda known, now_s: known.members,
     "receipt": lambda known, now_s: known.receipt,
     "ended": lambda known, now_s: known.ended,
+    "waits_for": lambda known, now_s: known.waits_for,
     "replay": lambda known, now_s: known.replay,
     "run": lambda known, now_s: run_of(known.console),
     "plan": lambda known, now_s: plan_of(known.console),

@@ -11,6 +11,7 @@ from dataclasses import asdict
 from math import inf
 from typing import Any
 
+from lab.advice.advisors import shown_name
 from lab.advice.journal import Undo
 from lab.errors import BadInput, counted
 from lab.learning.praise import Judgement
@@ -30,9 +31,11 @@ from lab.seat.replay_pace import ReplayPace
 from lab.seat.request_text import PathAhead
 from lab.seat.spoken_answers import SpokenAnswers
 from lab.seat.spoken_turns import ASKS, SpokenTurns, Turn, counts_at_once
+from lab.seat.timed_answers import Asking
 from lab.sequencing.search import SequenceRequest
 from lab.teaching.events import ORDER, Event, LessonBegan, LessonEvent
 from lab.teaching.lesson_plan import LessonPlan
+from lab.view.framing import Framing
 from lab.view.meshcat import LiveView
 from lab.words.meaning import Intent, Refusal
 
@@ -43,19 +46,21 @@ MOST_STATES = 50_000  # of problems whose shortest path is computed
 class SeatPage(LiveView):
     """The live page with a seat for one advisor; a context manager, like every live view.
 
-    wait_s: the time limit [s] for each answer; None: no limit. All methods are called by the session's thread. Entering
-    raises BadInput for a port that is taken or not allowed, and for a `wait_s` that is not finite and above 0.
+    wait_s: the time limit [s] for each answer; None: no limit. framing: the pages that may show this one in a frame. All methods
+    are called by the session's thread. Entering raises BadInput for a port that is taken or not allowed, and for a `wait_s` that
+    is not finite and above 0.
     """
 
-    def __init__(self, port: int = 0, *, wait_s: float | None = None) -> None:
+    def __init__(self, port: int = 0, *, wait_s: float | None = None, framing: Framing | None = None) -> None:
         if wait_s is not None and not 0 < wait_s < inf:
             raise BadInput(f"time to wait for an answer, {wait_s} s: must be finite and above 0")
-        super().__init__(port, title=TITLE)
+        super().__init__(port, title=TITLE, framing=framing)
         self._wait_s = wait_s
         self._panel: SeatPanel = SeatPanel(TITLE)
         self._path = PathAhead()
         self.spoken = SpokenAnswers()  # what the person has said in sentences
         self._turns = SpokenTurns(self.spoken, self._tell, self._command)
+        self.asking = Asking()  # how the last question was shown and answered
 
     def close(self) -> None:
         """Stop serving; whoever waits for an answer is told that the page was closed. Safe to call again."""
@@ -70,8 +75,10 @@ class SeatPage(LiveView):
         Raises AdvisorLeft for "auto", after the time limit and when the page is closed, Undo when an answer is taken back,
         and KeyboardInterrupt for "quit".
         """
+        self.asking = Asking(means="rule")
         if self._path.goes_on(request):
             self.look(request)
+            self.asking.means = "path goes on"
             return self._path.step()
         self._drop_path()
         turn = self._turns.before_asking(request)
@@ -102,7 +109,9 @@ class SeatPage(LiveView):
         said: list[Intent] = []
         while True:
             pending = self._pose(request, heard=heard)
+            self.asking.show()
             answer = self._panel.wait(pending)
+            self.asking.answered(*_means(answer))
             if answer is None or not answer.is_spoken:
                 return pending, answer, ASKS
             heard = None
@@ -277,6 +286,29 @@ class SeatPage(LiveView):
         with self._panel.lock:
             self._panel.known.learning.known = self.spoken.about = known
 
+    # ---- one of several people
+
+    @property
+    def attended(self) -> bool:
+        """Whether somebody sits at the page."""
+        return self._panel.attended
+
+    def skip(self) -> None:
+        """Leave the pending question to the learner; called by any thread."""
+        self._panel.skip()
+        self._wake()
+
+    def hurry(self, until_s: float) -> None:
+        """Show until when [s of the monotonic clock] the pending question waits; called by any thread."""
+        self._panel.hurry(until_s)
+        self._wake()
+
+    def waits_for(self, names: Sequence[str]) -> None:
+        """Show who else is asked, while this page's person has answered; () for nobody."""
+        if [*names] != self._panel.known.waits_for:
+            self._show("waits_for", [*names])
+            self._wake()
+
     # ---- receipt, advisors, end
 
     def receipt(self, document: Mapping[str, Any]) -> None:
@@ -285,13 +317,18 @@ class SeatPage(LiveView):
 
     def members(self, members: Iterable[Any]) -> None:
         """Show several advisors: records with `name`, `trust`, `low`, `high` and `dropped`."""
-        self._show("members", [asdict(member) for member in members])
+        known = [asdict(member) for member in members]
+        self._show("members", [member | {"name": shown_name(member["name"])} for member in known])
 
     def finished(self, text: str) -> None:
         """The lesson is over: show `text`, and ask nothing more."""
         self._panel.close()
         self._show("ended", text)
         self._wake()
+
+    def shown(self) -> Json:
+        """A summary of what else the page shows: see `SeatPanel.shown`."""
+        return {"page": self._panel.shown()}
 
     def _show(self, part: str, value: Any) -> None:
         with self._panel.lock:
@@ -301,6 +338,17 @@ class SeatPage(LiveView):
     def _wake(self) -> None:
         if self._server is not None:
             self._server.wake()
+
+
+def _means(answer: PageAnswer | None) -> tuple[str, str]:
+    """By which means an answer was given (see `lab.advice.answer_times.MEANS`), and the sentence that was said."""
+    if answer is None:
+        return "time over", ""
+    if answer.is_spoken:
+        return "sentence", answer.say
+    if answer.word in ("+", "-"):
+        return "praise", ""
+    return answer.word or ("path" if len(answer.path) > 1 else "move"), ""
 
 
 def _said(pending: Pending, answer: PageAnswer | None) -> Reply:

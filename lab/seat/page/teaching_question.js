@@ -6,7 +6,7 @@ const seat = (() => {
   const PLACES = ["1 / 2", "3 / 2", "2 / 1", "2 / 3", "3 / 5", "1 / 5"]; // row and column of each direction's button
   const LETTERS = { "+": "+", "=": "+", "-": "-", y: "own", Enter: "own", s: "skip", u: "undo", w: "why", a: "auto", q: "quit" };
   const PACES = { " ": "pause", n: "step", "-": "slower", "+": "faster", "=": "faster" };
-  const SURE_MS = 3000, REFUSAL_MS = 6000, SLOW_PAUSE_MS = 600, URGENT = new Set(["question", "you", "ended", "held"]);
+  const SURE_MS = 3000, REFUSAL_MS = 6000, SLOW_PAUSE_MS = 600, URGENT = new Set(["question", "you", "ended", "waits_for", "held"]);
   const el = (id) => document.getElementById(id);
   const state = { place: null, slice: null, work: null, run: null, plan: null, measured: [] }, dirty = new Set(), title = document.title;
   let finished = false, whyOpen = false, slow = false, lastDrawn = 0, later = 0, send = null, shown = null, sent = 0, until = null, armed = "", disarm = 0, fade = 0, moveButtons = new Map();
@@ -29,7 +29,7 @@ const seat = (() => {
   }
 
   const RENDERERS = [
-    [["you", "question", "lesson", "ended", "standing", "curve", "progress", "replay", "run"], showQuestion],
+    [["you", "question", "lesson", "ended", "waits_for", "standing", "curve", "progress", "replay", "run"], showQuestion],
     [["question", "lesson"], showMoves],
     [["question", "you", "lesson"], enable],
     [["replay", "question", "ended"], showReplay],
@@ -77,7 +77,8 @@ const seat = (() => {
   }
 
   function idle() {
-    const { standing, curve, lesson, progress } = state;
+    const { standing, curve, lesson, progress, waits_for: others = [] } = state;
+    if (others.length) return `You have answered. It waits for ${others.join(", ")}.`;
     if (progress && !standing.requests) return `${progress.phase}: ${Math.min(progress.done, progress.parts)} of ${progress.parts}.`;
     if (!curve.count && !lesson.title) return `Nothing is being learned yet.${lesson.asks ? " The learner will ask here when it wants advice." : ""}`;
     const episode = `${lesson.kind === "order" ? "Order" : "Episode"} ${curve.count}${lesson.episodes ? ` of ${lesson.episodes}` : ""}`;

@@ -27,6 +27,7 @@ from lab.seat.terminal.typed_answer import (
     JUDGE_HINT,
     is_sentence,
 )
+from lab.seat.timed_answers import Asking
 from lab.sequencing.search import SequenceRequest
 from lab.teaching.events import ORDER, Event, LessonEvent
 from lab.words.meaning import Refusal
@@ -59,6 +60,7 @@ class TeachingPrompt:
         self._guided = self._misleads = 0
         self.spoken = SpokenAnswers()  # what the person has said in sentences
         self._turns = SpokenTurns(self.spoken, self._say, self._command)
+        self.asking = Asking()  # how the last question was shown and answered
         self.on_heard: Callable[[Request, str, tuple[int, ...]], None] | None = (
             None  # what waits for agreement: text, path
         )
@@ -68,7 +70,9 @@ class TeachingPrompt:
         if self._done:
             raise AdvisorLeft
         self._meet(request)
+        self.asking = Asking(means="rule")
         if self._path.goes_on(request):
+            self.asking.means = "path goes on"
             return self._give(request, self._path.step())
         self._drop_path(f"the learner is {self._way(request).where(request, request.state)} now")
         try:
@@ -82,6 +86,7 @@ class TeachingPrompt:
             if self._read_line is None:
                 self._read_line = default_reader(self._console, plain=self._plain, outside=self._outside)
             self.show(request)
+            self.asking.show()
             return self._answer(request, self._read_line)
 
     def answer_from_outside(self, word: str) -> None:
@@ -119,8 +124,10 @@ class TeachingPrompt:
             try:
                 line = read_line(asked)
                 answer = way.understood(line, request)
+                self.asking.answered(_means(answer))
                 alone = answer == JUDGE_HINT and len(line.split()) == 1
                 if isinstance(answer, str) and answer not in ANSWERS and is_sentence(line) and not alone:
+                    self.asking.answered("sentence", line.strip())
                     turn = self._hear(line, answer, request, read_line)
                     if turn != ASKS:
                         return self._take(turn, request)
@@ -128,6 +135,7 @@ class TeachingPrompt:
                         self.on_heard(request, "", ())
                     continue
             except EOFError:
+                self.asking.answered("closed")
                 self._say("No more answers: the learner goes on alone.")
                 raise AdvisorLeft from None
             match answer:
@@ -290,3 +298,12 @@ class TeachingPrompt:
                 self._console.print(line, no_wrap=True, crop=False, overflow="ignore")
             else:
                 self._console.print(line)
+
+
+def _means(answer: object) -> str:
+    """By which means an answer was typed, see `lab.advice.answer_times.MEANS`."""
+    if isinstance(answer, Judgement):
+        return "praise"
+    if isinstance(answer, tuple):
+        return "path"
+    return "move" if isinstance(answer, int) else "auto" if answer == "done" else str(answer)

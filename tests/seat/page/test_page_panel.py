@@ -15,7 +15,7 @@ from lab.production.controls import Controls, Held, StopKind
 from lab.production.operation.desk import RunDesk
 from lab.production.run_journal import RunJournal
 from lab.seat.page.page_messages import PageAnswer
-from lab.seat.page.page_panel import SeatPanel, plain_json, word_of
+from lab.seat.page.page_panel import MOST_LAYERS, SeatPanel, plain_json, word_of
 from lab.seat.page.page_run import hear_run
 from lab.seat.page.page_state import PARTS, Pending, ShownLesson, hear
 from lab.tasks.task_file import load
@@ -114,6 +114,14 @@ def test_another_layer_is_sent_as_soon_as_it_is_time(panel: SeatPanel, clock: li
     assert panel.news(1) == ""
     clock[0] += 0.11
     assert set(told(panel)["seat"]) == {"slice"}
+
+
+def test_layers_without_end_are_not_all_kept(panel: SeatPanel, clock: list[float]) -> None:
+    for number in range(2 * MOST_LAYERS):
+        panel.said(1, json.dumps({"layer": number}))
+        clock[0] += 0.2
+        assert "slice" in told(panel)["seat"]
+    assert len(panel._layers) <= MOST_LAYERS
 
 
 def test_a_page_that_has_left_is_told_nothing(panel: SeatPanel) -> None:

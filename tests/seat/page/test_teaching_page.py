@@ -139,6 +139,32 @@ def test_words(
         assert browser.hear_until(lambda seat: not seat["question"])["question"] is None
 
 
+@pytest.mark.parametrize(
+    ("said", "means"),
+    [
+        ({"action": RIGHT}, ["move"]),
+        ({"path": [RIGHT, RIGHT]}, ["path", "path goes on"]),
+        ({"word": "skip"}, ["skip"]),
+        ({"word": "+"}, ["praise"]),
+    ],
+)
+def test_the_means_of_an_answer_are_known(
+    page: SeatPage, request_1: AdviceRequest, opens: "Opens", said: dict[str, Any], means: list[str]
+) -> None:
+    """A question that an earlier path answers is not shown, and has no latency."""
+    with opens(page) as browser:
+        asked = meanwhile(page.ask, replace(request_1, judgement="also"))
+        answer(browser, **said)
+        asked.result(20)
+        assert page.asking.means == means[0]
+        assert page.asking.shown is not None
+        assert page.asking.latency_s is not None
+        for later in means[1:]:
+            page.ask(replace(request_1, state=1, step=2))
+            now = page.asking
+            assert (now.means, now.shown, now.latency_s) == (later, None, None)
+
+
 @pytest.mark.parametrize(("word", "value"), [("+", 1), ("-", -1)])
 def test_a_judgement(page: SeatPage, request_1: AdviceRequest, opens: "Opens", word: str, value: int) -> None:
     with opens(page) as browser:
@@ -555,4 +581,7 @@ def test_a_sentence_counts_once_what_was_understood_is_agreed_to(
         assert after(say="go to the goal")["heard"]["text"] == "to the goal"
         answer(browser, number, agree=True)
         assert asked.result(20) == RIGHT
+        said = ["go to the fridge", "two steps right, please", "go to the goal"]
+        assert (page.asking.means, page.asking.said) == ("sentence", said)
         assert page.ask(replace(request_1, state=1, step=2)) == RIGHT  # the rest of the path
+        assert page.asking.means == "path goes on"

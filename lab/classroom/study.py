@@ -1,0 +1,149 @@
+"""A study with people as it is kept: its protocol, and the records of the participants who have agreed."""
+
+import hashlib
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from shutil import rmtree
+
+from lab.classroom.participant import FORMAT, Participant, timestamp
+from lab.classroom.roster import Pupil, Roster, StudyEntry
+from lab.classroom.study_protocol import MOST_BYTES, PlannedStep, StudyProtocol
+from lab.classroom.tile import TABLE
+from lab.errors import BadInput
+from lab.files import read_limited, write_whole
+from lab.teaching.lesson_options import LessonOptions
+
+PROTOCOL = "protocol.toml"
+OPTIONS = ("learner", "gate", "task", "episodes")  # of an arm, which errors name as those of the command line
+WITHDRAWN = ".withdrawn-"  # beginning of the name of a folder that is being deleted
+
+
+@dataclass
+class Study:
+    """A study in the folder of its roster. people: the participants who have agreed, by number."""
+
+    protocol: StudyProtocol
+    content: bytes  # of the protocol's file
+    roster: Roster
+    people: dict[int, Participant] = field(default_factory=dict)
+
+    @classmethod
+    def new(cls, file: Path, out: Path, check: Callable[[LessonOptions], object]) -> "Study":
+        """A new study by a protocol's file, which is not written yet.
+
+        check: raises BadInput for a lesson that cannot be taught. Raises BadInput, with the protocol's line, for what is wrong
+        in it, and for a folder that holds a class.
+        """
+        protocol, toml = StudyProtocol.read(file)
+        lessons = protocol.lessons(file.parent)
+        for lesson, place in zip(lessons, protocol.places_of_lessons(), strict=True):
+            try:
+                check(lesson)
+            except BadInput as error:
+                key = next((key for key in OPTIONS if f"--{key}" in str(error)), None)
+                at = place if key is None else (*place[:2], key)
+                raise toml.refusal(at, str(error).replace(f"--{key}", str(key))) from None
+        roster = Roster.new(out, lessons, protocol.seed, protocol.participants, False)
+        content = _content(file)
+        roster.study = StudyEntry(hashlib.sha256(content).hexdigest())
+        return cls(protocol, content, roster)
+
+    @classmethod
+    def read(cls, roster: Roster) -> "Study":
+        """The study in the folder of a roster. Raises BadInput if its protocol has been changed, or a record is damaged."""
+        assert roster.study is not None
+        file = roster.folder / PROTOCOL
+        content = _content(file)
+        if (now := hashlib.sha256(content).hexdigest()) != roster.study.protocol_sha256:
+            raise BadInput(
+                f"protocol '{file}' (--resume) has been changed since the study began: SHA-256 {now[:12]}..., wanted "
+                f"{roster.study.protocol_sha256[:12]}...: put the old file back, or begin a new study"
+            )
+        study = cls(StudyProtocol.read(file)[0], content, roster)
+        if len(study.protocol.places_of_lessons()) != len(roster.lessons):
+            raise BadInput(f"study '{roster.folder}' (--resume): its lessons are not those of its protocol")
+        for pupil in roster.present:
+            if study.folder(pupil).is_dir():
+                study.people[pupil.number] = study._checked(
+                    Participant.read(study.folder(pupil), pupil.number, pupil.name)
+                )
+        return study
+
+    def _checked(self, person: Participant) -> Participant:
+        arms = sorted(arm.name for arm in self.protocol.arms)
+        fits = sorted(person.order) == arms or (
+            self.protocol.order == "between" and person.order in [[arm] for arm in arms]
+        )
+        planned = self.protocol.steps(person.order) if fits else []
+        if [step.plan for step in person.steps] != planned[: len(person.steps)] or not person.steps:
+            raise BadInput(
+                f"participant {person.participant} of '{self.roster.folder}' (--resume): the steps are not the protocol's"
+            )
+        lesson = next((step.lesson for step in reversed(person.steps) if step.kind == "lesson"), None) or 1
+        pupil = self.roster.pupils[person.number - 1]
+        if pupil.lesson != lesson - 1:  # the roster could not be written when the lesson began
+            self.roster.pupils[person.number - 1] = replace(pupil, lesson=lesson - 1)
+        return person
+
+    def begin(self) -> None:
+        """Write the protocol into the study's folder, and finish withdrawals that were cut off. Raises OSError."""
+        self.roster.folder.mkdir(parents=True, exist_ok=True)
+        write_whole(self.roster.folder / PROTOCOL, self.content)
+        for left in self.roster.folder.glob(f"{WITHDRAWN}*"):
+            rmtree(left)
+        for pupil in self.roster.present:
+            if pupil.number not in self.people:  # the folder is gone, or was never made
+                self.roster.retire(pupil.number)
+
+    # ---- participants
+
+    def folder(self, pupil: Pupil) -> Path:
+        """The folder of a participant."""
+        return self.roster.folder / pupil.folder
+
+    def admit(self, key: str) -> Pupil:
+        """A new participant, who has agreed and is at the first step. Raises Full, and OSError: then nothing is kept."""
+        name = f"P{len(self.roster.pupils) + 1:02}" if self.protocol.names == "ids" else ""
+        pupil, position = self.roster.admit(key, name)
+        order = [*self.protocol.order_at(position)]
+        person = Participant(FORMAT, pupil.name, pupil.number, order, timestamp())
+        try:
+            self.keep(person.at_next(self.protocol.steps(order)))
+        except OSError:
+            with suppress(OSError):
+                self.delete(pupil)
+            raise
+        return pupil
+
+    def keep(self, person: Participant) -> None:
+        """Take over a participant's new record and write it. Raises OSError: then the old one stays."""
+        person.write(self.folder(self.roster.pupils[person.number - 1]))
+        self.people[person.number] = person
+
+    def told(self) -> dict[str, object]:
+        """What the page of whoever leads the study needs: its title, and what that page may do."""
+        return {"title": self.protocol.title, "may": self.protocol.teacher_may}
+
+    def planned(self, person: Participant) -> list[PlannedStep]:
+        """All steps of a participant."""
+        return self.protocol.steps(person.order)
+
+    def delete(self, pupil: Pupil) -> None:
+        """Delete everything about a participant but the number. Raises OSError; a study that goes on then finishes it."""
+        self.people.pop(pupil.number, None)
+        folder, leaving = self.folder(pupil), self.roster.folder / f"{WITHDRAWN}{pupil.number}"
+        if folder.is_dir():
+            folder.rename(leaving)
+        if leaving.is_dir():
+            rmtree(leaving)
+        (self.roster.folder / TABLE).unlink(missing_ok=True)  # written anew when the study's server ends
+        self.roster.retire(pupil.number)
+
+
+def _content(file: Path) -> bytes:
+    try:
+        return read_limited(file, MOST_BYTES)
+    except OSError as error:
+        raise BadInput(f"protocol '{file}': {error.strerror or error}") from None
