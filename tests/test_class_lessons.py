@@ -318,6 +318,16 @@ def test_the_other_commands_of_a_sheet_print_what_it_says(
 # ---- further numbers of the sheets
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_path_that_is_a_little_too_long_is_believed_and_kept(seed: int) -> None:
+    """Lessons 1 and 2: whoever leads by 16 moves, where 14 are the fewest, is believed to the end."""
+    moves = ["udlr".index(move) for move in "rrrddrruurrddddd"]
+    lesson = lab.teach(
+        "class-maze", seed=seed, advisor=lambda asks: moves[asks.step - 1] if asks.step <= len(moves) else None
+    )
+    assert (lesson.session.final_steps, lesson.session.rejected_at_episode) == (16, None)
+
+
 @pytest.mark.parametrize("change", [("step = 0.0", "step = -0.1"), ("discount = 1.0", "discount = 0.9")])
 def test_either_cure_of_lesson_3_ends_the_circles(tmp_path: Path, change: tuple[str, str]) -> None:
     text = (ROOT / "tasks" / "class-no-hurry.toml").read_text()
