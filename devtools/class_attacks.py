@@ -112,10 +112,9 @@ def taught(folder: Path, secured: bool, attacked: Callable[[Running], Any], swee
             barrier = Barrier(len(NAMES), lambda: attack.append(pool.submit(attacked, running)))
             pupils = [pool.submit(_pupil, running, name, barrier, attack) for name in NAMES]
             waits_s = sorted(wait for pupil in pupils for wait in pupil.result())
-        desk_mb = max(map(_peak_mb, _descendants(child.pid)), default=0.0)
+        peak_mb, desk_mb = _peak_mb(child.pid), max(map(_peak_mb, _descendants(child.pid)), default=0.0)
         _end(running, sweeps)
-        _, status, used = os.wait4(child.pid, 0)
-        child.returncode = os.waitstatus_to_exitcode(status)
+        child.wait(WAIT_S)
     finally:
         kill_session(child.pid)
     own = folder / "class"
@@ -127,7 +126,7 @@ def taught(folder: Path, secured: bool, attacked: Callable[[Running], Any], swee
     size = sum(file.stat().st_size for file in own.rglob("*") if file.is_file())
     return Taught(
         child.returncode, journals, (folder / "stderr").read_text(errors="replace"), waits_s[int(0.95 * len(waits_s))],
-        waits_s[-1], used.ru_maxrss / 1024, desk_mb, size / 1024,
+        waits_s[-1], peak_mb, desk_mb, size / 1024,
     )  # fmt: skip
 
 
@@ -197,6 +196,7 @@ def _descendants(process: int) -> set[int]:
 
 
 def _peak_mb(process: int) -> float:
+    """The most memory of a process so far [MB]; 0 if it has ended."""
     with suppress(OSError):
         if match := re.search(r"VmHWM:\s*(\d+) kB", Path(f"/proc/{process}/status").read_text()):
             return int(match[1]) / 1024

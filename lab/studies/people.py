@@ -314,6 +314,8 @@ def _fitted(
     if np.linalg.matrix_rank(x) < x.shape[1]:
         return None
     scale = float(np.std(y))
+    if np.abs(y - x @ np.linalg.lstsq(x, y)[0]).max() <= ALIKE * scale:  # nothing varies but the arms
+        return None
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         try:
@@ -321,11 +323,9 @@ def _fitted(
                 y / scale, x, groups=[person for _, person in keys]
             )
             fit = model.fit(reml=True)
-            ends, tested = (
-                fit.conf_int(1 - LEVEL),
-                fit.wald_test(np.eye(len(fit.params))[1 : len(present)], scalar=True),
-            )
-        except np.linalg.LinAlgError:
+            ends = fit.conf_int(1 - LEVEL)
+            tested = fit.wald_test(np.eye(len(fit.params))[1 : len(present)], scalar=True)
+        except (np.linalg.LinAlgError, ValueError):  # a variance that cannot be told from 0
             return None
     terms = [
         ModelTerm(
@@ -337,7 +337,8 @@ def _fitted(
         for n, name in enumerate(columns)
         if n
     ]
-    if not all(np.isfinite([term.value, *term.ci95, term.p]).all() for term in terms):
+    known = [number for term in terms for number in (term.value, *term.ci95, term.p)]
+    if not np.isfinite([*known, float(tested.pvalue), float(fit.scale), np.asarray(fit.cov_re)[0, 0]]).all():
         return None
     between = scale * float(np.sqrt(max(0.0, np.asarray(fit.cov_re)[0, 0])))
     notes = [] if fit.converged else ["it did not converge"]

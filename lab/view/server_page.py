@@ -15,7 +15,6 @@ from typing import Any, Protocol
 from starlette.websockets import WebSocketDisconnect
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
-from websockets.frames import Frame
 
 from lab.operating_system import most_descriptors
 
@@ -145,12 +144,12 @@ class LimitedSocket(WebSocketsSansIOProtocol):
         if self.queue.qsize() > MOST_WAITING:
             self.transport.abort()
 
-    def handle_cont(self, event: Frame) -> None:
+    def handle_cont(self, event: Any) -> None:
         """A further fragment of a message."""
         self._count()
         super().handle_cont(event)
 
-    def handle_pong(self, event: Frame) -> None:
+    def handle_pong(self, event: Any) -> None:
         """An answer to a ping."""
         self._count()
         super().handle_pong(event)

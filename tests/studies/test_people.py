@@ -125,6 +125,13 @@ def test_the_model_finds_the_differences_of_arms() -> None:
     assert model.between_sd == pytest.approx(np.std([1, 12, 23, 4], ddof=1), rel=0.1)
 
 
+def test_no_model_is_fitted_where_nothing_varies_but_the_arms() -> None:
+    pytest.importorskip("statsmodels")
+    _, (measure,), _ = compare_arms(within({"a": [4, 4, 4], "b": [201, 201, 201], "c": [4, 4, 4]}))
+    assert measure.model is None
+    assert measure.pairs[0].difference == 197
+
+
 def test_the_usual_measures_are_those_that_have_values() -> None:
     rows = [row | {"tlx_mean": 5.0, "answers": None, "skill": "x", "extra": 1} for row in within(SIX)]
     assert [measure.name for measure in compare_arms(rows, model=False)[1]] == ["seconds", "tlx_mean"]
