@@ -19,7 +19,7 @@ from lab.advice.answer_times import AnswerTimes
 from lab.advice.entries import FILE, is_unbegun, read_journal
 from lab.classroom.class_lesson import ClassLesson
 from lab.classroom.order_lesson import order_lesson
-from lab.errors import LabError
+from lab.errors import BadInput, LabError
 from lab.files import is_file
 from lab.operating_system import own_session
 from lab.plugins.code_file import files_taken
@@ -74,7 +74,7 @@ def sit(order: DeskOrder, pipe: Connection) -> None:
             pages = {name: stack.enter_context(SeatPage()) for name in _people(order) or [""]}
             pipe.send(("pages", {name: (page.port, page.token) for name, page in pages.items()}))
             closed = threading.Event()
-            threading.Thread(target=_until_closed, args=[pipe, closed], daemon=True).start()
+            threading.Thread(target=_until_closed, args=[pipe, closed, order.folder], daemon=True).start()
             said = _taught(order, pages)
             with suppress(OSError):
                 pipe.send(said)
@@ -129,8 +129,7 @@ def _table_lesson(order: DeskOrder, options: LessonOptions, toolbox: Toolbox, se
     """The document of `lab teach --json`; a lesson that is over, whose document was lost, is run again from its journal."""
     kept = None
     if is_file(order.folder / FILE):
-        is_over = not is_unbegun(order.folder / FILE) and read_journal(order.folder, RESUMED).closed is not None
-        kept = KeptSession(order.folder, RESUMED, read_only=is_over, trusted=order.modules)
+        kept = KeptSession(order.folder, RESUMED, read_only=_is_over(order.folder), trusted=order.modules)
         options = kept.options
     else:
         check_new(order.folder)
@@ -141,11 +140,23 @@ def _table_lesson(order: DeskOrder, options: LessonOptions, toolbox: Toolbox, se
     return document
 
 
-def _until_closed(pipe: Connection, closed: threading.Event) -> None:
-    """Interrupt the lesson when the pipe closes; if it does not end within a few seconds, end the process."""
+def _is_over(folder: Path) -> bool:
+    """Whether the session in a folder has ended."""
+    with suppress(BadInput):
+        journal = folder / FILE
+        return is_file(journal) and not is_unbegun(journal) and read_journal(folder, RESUMED).closed is not None
+    return False
+
+
+def _until_closed(pipe: Connection, closed: threading.Event, folder: Path) -> None:
+    """Interrupt the lesson in a folder when the pipe closes, unless it is over and its document is about to come.
+
+    If it does not end within a few seconds, end the process.
+    """
     with suppress(EOFError, OSError):
         pipe.recv()
     closed.set()
-    interrupt_main()
+    if not _is_over(folder):
+        interrupt_main()
     threading.Event().wait(LAST_S)
     os._exit(1)
