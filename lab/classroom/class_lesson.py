@@ -36,6 +36,12 @@ def name_of(lesson: ClassLesson) -> str:
     return f"{ORDER}{lesson.task}" if isinstance(lesson, OrderSessionOptions) else lesson.subtask
 
 
+def named_by(lesson: ClassLesson) -> list[str]:
+    """The world or sub-task, and the task, that a lesson names."""
+    about = lesson.task if isinstance(lesson, OrderSessionOptions) else lesson.subtask
+    return [name for name in dict.fromkeys([about, lesson.task]) if name]
+
+
 def title_of(lesson: ClassLesson) -> str:
     """A lesson for people, such as "insert of toast", "world-1" or "order of toast-case-1"."""
     if isinstance(lesson, OrderSessionOptions):

@@ -12,14 +12,14 @@ from lab.classroom.class_lesson import name_of
 from lab.classroom.class_record import LessonRecord, Number, TaughtLesson, class_record
 from lab.classroom.curve_chart import Chart, Curve, Kind, chart_of
 from lab.classroom.roster import Pupil, Roster
-from lab.classroom.tile import COLUMNS
+from lab.classroom.tile import COLUMNS, HAND_OUTS, REPORT, TABLE
 from lab.errors import BadInput, counted
 from lab.files import csv_of, write_whole
 from lab.lazy import jinja2
 from lab.version import __version__
 
 HERE = Path(__file__).parent
-REPORT, HAND_OUTS, HAND_OUT, TABLE = "report.html", "hand-outs.html", "hand-out.html", "class.csv"
+HAND_OUT = "hand-out.html"
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"  # of all pages
 PNG = b"\x89PNG\r\n\x1a\n"
 LEGEND = {  # of the lines of a report's picture

@@ -31,7 +31,7 @@ from lab.classroom.browser_socket import closer, sender, text_of
 from lab.classroom.certificate import fingerprint, made_certificate
 from lab.classroom.class_lesson import title_of
 from lab.classroom.class_place import Place, files_of
-from lab.classroom.class_report import HAND_OUTS, POLICY, REPORT, page_now
+from lab.classroom.class_report import POLICY, page_now
 from lab.classroom.code_picture import code_svg
 from lab.classroom.desk import Desk, nothing_shown
 from lab.classroom.door import Door, Often
@@ -41,7 +41,7 @@ from lab.classroom.step_pages import StepPages
 from lab.classroom.study import Study
 from lab.classroom.study_room import StudyRoom
 from lab.classroom.team_room import TeamRoom
-from lab.classroom.tile import COLUMNS
+from lab.classroom.tile import COLUMNS, HAND_OUTS, REPORT
 from lab.errors import BadInput, WorkFailed
 from lab.files import csv_of
 from lab.view.server import answer_of, config_of, listening

@@ -21,12 +21,14 @@ from lab.classroom.class_lesson import ClassLesson
 from lab.classroom.order_lesson import order_lesson
 from lab.errors import BadInput, LabError
 from lab.files import is_file
+from lab.learning.session_events import EpisodeEnded
 from lab.operating_system import own_session
 from lab.plugins.code_file import files_taken
 from lab.seat.lesson_seat import LessonSeat
 from lab.seat.page.teaching_page import SeatPage
 from lab.seat.run_progress import RunProgress
 from lab.seat.team import Team
+from lab.teaching.events import Event, LessonBegan, LessonEvent
 from lab.teaching.kept_order import OrderSessionOptions
 from lab.teaching.kept_session import KeptSession, check_new, read_session
 from lab.teaching.lesson import teach
@@ -39,6 +41,7 @@ from lab.view.progress import EscapingConsole
 
 RESUMED = "lab class --resume"  # where a journal is named, for errors
 LAST_S = 10.0  # time for a lesson to end after its pipe has closed
+DRAWN_S = 60.0  # time for the document and the pictures of one that is over
 
 
 @dataclass(frozen=True)
@@ -73,9 +76,9 @@ def sit(order: DeskOrder, pipe: Connection) -> None:
         with ExitStack() as stack:
             pages = {name: stack.enter_context(SeatPage()) for name in _people(order) or [""]}
             pipe.send(("pages", {name: (page.port, page.token) for name, page in pages.items()}))
-            closed = threading.Event()
-            threading.Thread(target=_until_closed, args=[pipe, closed, order.folder], daemon=True).start()
-            said = _taught(order, pages)
+            closed, taught = threading.Event(), threading.Event()
+            threading.Thread(target=_until_closed, args=[pipe, closed, taught], daemon=True).start()
+            said = _taught(order, pages, taught)
             with suppress(OSError):
                 pipe.send(said)
             closed.wait()  # the pages go on showing how it ended, until the class closes the desk
@@ -95,9 +98,10 @@ def _people(order: DeskOrder) -> list[str]:
     return [name.removeprefix(PAGE_OF) for name in options.advisor_names]
 
 
-def _taught(order: DeskOrder, pages: Mapping[str, SeatPage]) -> tuple[Any, ...]:
+def _taught(order: DeskOrder, pages: Mapping[str, SeatPage], taught: threading.Event) -> tuple[Any, ...]:
+    """What is sent through the pipe at the end; `taught` is set once the last episode has ended."""
     try:
-        return "over", _lesson(order, pages)
+        return "over", _lesson(order, pages, taught)
     except KeyboardInterrupt as stopped:  # Interrupted, too, which is one
         return "stopped", str(stopped)
     except LabError as error:
@@ -106,7 +110,7 @@ def _taught(order: DeskOrder, pages: Mapping[str, SeatPage]) -> tuple[Any, ...]:
         return "failed", str(error)
 
 
-def _lesson(order: DeskOrder, pages: Mapping[str, SeatPage]) -> Mapping[str, Any]:
+def _lesson(order: DeskOrder, pages: Mapping[str, SeatPage], taught: threading.Event) -> Mapping[str, Any]:
     """The document of `lab teach --json`, or of `lab sequence --json` for a lesson on an order."""
     take_again(order.files)
     with ExitStack() as stack:
@@ -122,25 +126,38 @@ def _lesson(order: DeskOrder, pages: Mapping[str, SeatPage]) -> Mapping[str, Any
         if isinstance(order.options, OrderSessionOptions):
             return order_lesson(order.options, order.folder, toolbox, seat)
         options = order.options if team is None else replace(order.options, advisors=tuple(team.pages))
-        return _table_lesson(order, options, toolbox, seat)
+        return _table_lesson(order, options, toolbox, seat, taught)
 
 
-def _table_lesson(order: DeskOrder, options: LessonOptions, toolbox: Toolbox, seat: LessonSeat) -> Mapping[str, Any]:
+def _table_lesson(
+    order: DeskOrder, options: LessonOptions, toolbox: Toolbox, seat: LessonSeat, taught: threading.Event
+) -> Mapping[str, Any]:
     """The document of `lab teach --json`; a lesson that is over, whose document was lost, is run again from its journal."""
     kept = None
     if is_file(order.folder / FILE):
-        kept = KeptSession(order.folder, RESUMED, read_only=_is_over(order.folder), trusted=order.modules)
+        kept = KeptSession(order.folder, RESUMED, read_only=is_over(order.folder), trusted=order.modules)
         options = kept.options
     else:
         check_new(order.folder)
     subject = subject_of(options, kept)
-    teacher = Teacher(toolbox, options.advising(seat.people()), options.seed, seat.hear)
+    last = 0  # the number of the last episode
+
+    def hear(event: Event) -> None:
+        nonlocal last
+        seat.hear(event)
+        match event:
+            case LessonBegan():
+                last = event.plan.learner.episodes
+            case LessonEvent(event=EpisodeEnded(episode=episode)) if episode >= last:
+                taught.set()
+
+    teacher = Teacher(toolbox, options.advising(seat.people()), options.seed, hear)
     document = teach(subject, options, teacher, order.folder, kept)
     seat.lesson_over(document)
     return document
 
 
-def _is_over(folder: Path) -> bool:
+def is_over(folder: Path) -> bool:
     """Whether the session in a folder has ended."""
     with suppress(BadInput):
         journal = folder / FILE
@@ -148,15 +165,16 @@ def _is_over(folder: Path) -> bool:
     return False
 
 
-def _until_closed(pipe: Connection, closed: threading.Event, folder: Path) -> None:
-    """Interrupt the lesson in a folder when the pipe closes, unless it is over and its document is about to come.
+def _until_closed(pipe: Connection, closed: threading.Event, taught: threading.Event) -> None:
+    """Interrupt the lesson when the pipe closes, unless it has been taught and its document is about to come.
 
     If it does not end within a few seconds, end the process.
     """
     with suppress(EOFError, OSError):
         pipe.recv()
     closed.set()
-    if not _is_over(folder):
-        interrupt_main()
+    if taught.is_set():
+        threading.Event().wait(DRAWN_S)
+    interrupt_main()
     threading.Event().wait(LAST_S)
     os._exit(1)

@@ -51,6 +51,8 @@ def export(folder: Path, out: Path, parquet: bool = False) -> dict[str, Any]:
         out.mkdir(parents=True, exist_ok=True)
         for name, content in files.items():
             write_whole(out / name, content)
+        for name in () if parquet else tables:  # of an export before this one
+            (out / f"{name}.parquet").unlink(missing_ok=True)
     except OSError as error:
         raise BadInput(f"export '{out}' (--out): {error.strerror or error}") from None
     return document | {"files": {name: str(out / name) for name in files}}

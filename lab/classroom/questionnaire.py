@@ -10,7 +10,7 @@ from lab.tasks.record import Name, Record, as_tuple
 
 MOST_TEXT = 20_000  # characters of a text that participants read
 Answer = int | str
-Text = Annotated[str, Field(min_length=1, max_length=MOST_TEXT)]
+Text = Annotated[str, Field(min_length=1, max_length=MOST_TEXT, pattern=r"\S")]
 Label = Annotated[str, Field(min_length=1, max_length=200)]
 Labels = Annotated[tuple[Label, ...], BeforeValidator(as_tuple), Field(max_length=50)]
 Place = Literal["before", "after-lesson", "after-arm", "end"]
@@ -67,7 +67,9 @@ class QuestionItem(Record):
             low, high, step = self.range_
             if len(self.labels) not in (0, 2):
                 raise ValueError(f"labels of item '{self.name}': {len(self.labels)}: wanted 2, for the ends")
-            if high <= low or (high - low) % step:
+            if high <= low:
+                raise ValueError(f"highest {high} of item '{self.name}': wanted above lowest {low}")
+            if (high - low) % step:
                 raise ValueError(f"highest {high} of item '{self.name}': wanted {low} plus a multiple of step {step}")
         return self
 

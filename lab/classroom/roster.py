@@ -74,11 +74,12 @@ class Pupil:
 class StudyEntry:
     """What a class's file keeps of a study: the SHA-256 of its protocol, and the position of each number in the design.
 
-    A position is None for who has withdrawn: the next participant gets it.
+    A position is None for who has withdrawn: the next participant gets it. inputs_sha256: of what each lesson is about.
     """
 
     protocol_sha256: str
     positions: list[int | None] = field(default_factory=list)
+    inputs_sha256: list[str] = field(default_factory=list)
 
     def free_position(self) -> int:
         """The lowest position (from 0) that no participant has."""

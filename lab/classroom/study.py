@@ -1,18 +1,20 @@
 """A study with people as it is kept: its protocol, and the records of the participants who have agreed."""
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from shutil import rmtree
 
+from lab.classroom.class_lesson import ClassLesson, named_by
 from lab.classroom.participant import FORMAT, Participant, timestamp
 from lab.classroom.roster import Pupil, Roster, StudyEntry
 from lab.classroom.study_protocol import MOST_BYTES, PlannedStep, StudyProtocol
-from lab.classroom.tile import TABLE
+from lab.classroom.tile import HAND_OUTS, REPORT, TABLE
 from lab.errors import BadInput
 from lab.files import read_limited, write_whole
+from lab.teaching.kept_inputs import sha256_of
 from lab.teaching.lesson_options import LessonOptions
 
 PROTOCOL = "protocol.toml"
@@ -47,7 +49,7 @@ class Study:
                 raise toml.refusal(at, str(error).replace(f"--{key}", str(key))) from None
         roster = Roster.new(out, lessons, protocol.seed, protocol.participants, False)
         content = _content(file)
-        roster.study = StudyEntry(hashlib.sha256(content).hexdigest())
+        roster.study = StudyEntry(hashlib.sha256(content).hexdigest(), inputs_sha256=inputs_of(lessons))
         return cls(protocol, content, roster)
 
     @classmethod
@@ -60,6 +62,11 @@ class Study:
             raise BadInput(
                 f"protocol '{file}' (--resume) has been changed since the study began: SHA-256 {now[:12]}..., wanted "
                 f"{roster.study.protocol_sha256[:12]}...: put the old file back, or begin a new study"
+            )
+        if roster.study.inputs_sha256 and (changed := _changed(roster)):
+            raise BadInput(
+                f"'{changed}', which a lesson of the study '{roster.folder}' (--resume) is about, has been changed since the "
+                "study began: put the old one back, or begin a new study"
             )
         study = cls(StudyProtocol.read(file)[0], content, roster)
         if len(study.protocol.places_of_lessons()) != len(roster.lessons):
@@ -138,8 +145,21 @@ class Study:
             folder.rename(leaving)
         if leaving.is_dir():
             rmtree(leaving)
-        (self.roster.folder / TABLE).unlink(missing_ok=True)  # written anew when the study's server ends
+        for written in (TABLE, REPORT, HAND_OUTS):  # written anew when the study's server ends
+            (self.roster.folder / written).unlink(missing_ok=True)
         self.roster.retire(pupil.number)
+
+
+def inputs_of(lessons: Sequence[ClassLesson]) -> list[str]:
+    """The SHA-256 of what each lesson is about: its world or task, and the files that these name."""
+    return [sha256_of(named_by(lesson)) for lesson in lessons]
+
+
+def _changed(roster: Roster) -> str:
+    """The first lesson's world or task that is not the one with which the study began, "" for none."""
+    assert roster.study is not None
+    known = zip(roster.lessons, inputs_of(roster.lessons), roster.study.inputs_sha256, strict=False)
+    return next((" of ".join(named_by(lesson)) for lesson, now, then in known if now != then), "")
 
 
 def _content(file: Path) -> bytes:

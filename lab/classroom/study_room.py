@@ -9,6 +9,7 @@ from secrets import token_urlsafe
 from typing import Any
 
 from lab.classroom.desk import Desk
+from lab.classroom.desk_process import is_over
 from lab.classroom.participant import Participant, Step, seconds_since, timestamp
 from lab.classroom.questionnaire import checked_answers
 from lab.classroom.room import RELOAD, Json, PupilPage, Room
@@ -19,7 +20,7 @@ from lab.errors import BadInput
 
 MOST_UNDECIDED = 200  # who have joined and not agreed yet; the first of them has to join again
 HERE_S = 15.0  # for which a page that asks for its step every few seconds counts as open
-STUCK = ("failed", "stopped", "lost")  # states of a desk whose lesson does not go on by itself
+STUCK = ("failed", "lost")  # states of a desk whose lesson does not go on by itself
 
 
 class StudyRoom(Room):
@@ -81,11 +82,15 @@ class StudyRoom(Room):
         self._lesson_seen(number, desk)
 
     def _lesson_seen(self, number: int, desk: Desk) -> None:
-        """End the lesson's step when the lesson is over; start its clock when its page is there."""
+        """End the lesson's step when its last episode has ended, or who teaches it has; start its clock when its page is there.
+
+        The document and the pictures of the lesson, which come later, are no time of the participant's.
+        """
         step = self._step(number)
         if self.desks.get(number) is not desk or step is None or step.kind != "lesson" or step.ended is not None:
             return
-        if desk.state == "over" and (desk.parts.get("ended") or not desk.is_there):
+        has_quit = desk.state == "stopped" and not desk.is_closed
+        if has_quit or _is_taught(desk) or (desk.state == "over" and (desk.parts.get("ended") or not desk.is_there)):
             self._end_lesson(number, timed_out=False)
         elif desk.state == "open" and number in self._fresh:
             self._fresh.discard(number)
@@ -120,7 +125,9 @@ class StudyRoom(Room):
         person = self.study.people.get(number)
         if person is None or len(person.steps) != at or person.steps[-1].ended is not None:
             return
-        self._end_lesson(number, timed_out=self.desks[number].state != "over")
+        self._end_lesson(
+            number, timed_out=not (_is_taught(self.desks[number]) or is_over(self.desks[number].order.folder))
+        )
 
     def _end_lesson(self, number: int, timed_out: bool) -> None:
         """The lesson's step has ended: its page offers to go on, and after its time the desk is closed."""
@@ -204,7 +211,7 @@ class StudyRoom(Room):
             case {"do": "decline"} if hash_of(key) in self._undecided:
                 del self._undecided[hash_of(key)]
                 return {"kind": "declined"}
-            case {"do": "go on", "step": int(at)} if (person := self._person(key)) is not None:
+            case {"do": "go on", "step": int(at)} if type(at) is int and (person := self._person(key)) is not None:
                 self._go_on(person, at, wish.get("answers", {}))
             case {"do": "withdraw"} if (person := self._person(key)) is not None:
                 await self._withdraw(person.number)
@@ -228,7 +235,7 @@ class StudyRoom(Room):
         """End the current step, if it may end, and begin the next one."""
         step = person.step
         if step is None or at != len(person.steps):
-            raise BadInput(f"You are at step {len(person.steps)} already.")
+            raise BadInput(f"You are at step {len(person.steps)}, not {at}.")
         if step.kind == "lesson" and step.ended is None and not self._is_stuck(person.number):
             raise BadInput("This lesson is not over yet.")
         answers = {}
@@ -308,11 +315,9 @@ class StudyRoom(Room):
         step = self._step(number)
         if step is None or step.kind != "lesson":
             return "No lesson is open now."
-        return (
-            "Your time for this lesson is up."
-            if step.timed_out
-            else "This lesson has stopped: tell whoever leads the study."
-        )
+        if step.ended is None:
+            return "This lesson has stopped: tell whoever leads the study."
+        return "Your time for this lesson is up." if step.timed_out else "You have ended this lesson."
 
     # ---- who leads the study
 
@@ -367,6 +372,12 @@ class StudyRoom(Room):
                 "doing": _doing(step),
             }
         return tiles
+
+
+def _is_taught(desk: Desk) -> bool:
+    """Whether the last episode of a desk's lesson has ended."""
+    lesson, curve = desk.parts.get("lesson") or {}, desk.parts.get("curve") or {}
+    return bool(0 < lesson.get("episodes", 0) <= curve.get("count", 0))
 
 
 def _doing(step: Step | None) -> str:

@@ -7,7 +7,7 @@ from lab.classroom.desk import Desk
 from lab.classroom.roster import Pupil
 
 Json = dict[str, Any]
-TABLE = "class.csv"  # the rows, in the folder of the class
+TABLE, REPORT, HAND_OUTS = "class.csv", "report.html", "hand-outs.html"  # the rows and the pages, in the class's folder
 MOST_POINTS = 60  # of a tile's curve
 COLUMNS = (
     *("pupil", "name", "lesson", "skill", "state", "episodes", "solved", "final_steps", "optimal_steps"),

@@ -33,6 +33,7 @@ LOAD = "_mean"  # the end of a measure's name that is the mean of a questionnair
 REPEATS = 2000  # of a bootstrap
 LEAST = 3  # participants of a test
 ALIKE = 1e-9  # differences below this count as none
+NO_SHARE = 1e-3  # of the standard deviation of the rest, below which that between participants counts as none
 
 
 @dataclass(frozen=True)
@@ -323,6 +324,8 @@ def _fitted(
                 y / scale, x, groups=[person for _, person in keys]
             )
             fit = model.fit(reml=True)
+            if not fit.converged:
+                fit = model.fit(reml=True, method="powell")
             ends = fit.conf_int(1 - LEVEL)
             tested = fit.wald_test(np.eye(len(fit.params))[1 : len(present)], scalar=True)
         except (np.linalg.LinAlgError, ValueError):  # a variance that cannot be told from 0
@@ -341,8 +344,11 @@ def _fitted(
     if not np.isfinite([*known, float(tested.pvalue), float(fit.scale), np.asarray(fit.cov_re)[0, 0]]).all():
         return None
     between = scale * float(np.sqrt(max(0.0, np.asarray(fit.cov_re)[0, 0])))
-    notes = [] if fit.converged else ["it did not converge"]
-    notes += ["participants do not differ beyond the rest"] * any("boundary" in str(one.message) for one in told)
+    notes = [] if fit.converged else ["it did not converge: its p and intervals are not to be trusted"]
+    if between <= NO_SHARE * scale * float(np.sqrt(fit.scale)):
+        notes.append("participants do not differ beyond the rest")
+    elif any("boundary" in str(one.message) for one in told):
+        notes.append("the estimates may lie on the boundary of what is possible")
     return MixedModel(terms, float(tested.pvalue), between, scale * float(np.sqrt(fit.scale)), "; ".join(notes))
 
 

@@ -7,7 +7,7 @@ leads out of the folder.
 import hashlib
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from importlib.metadata import PackageNotFoundError, version
@@ -127,6 +127,12 @@ def keep_inputs(
         write_whole(folder / FILE, (dumps(asdict(kept), indent=1) + "\n").encode())
     except OSError as error:
         raise BadInput(f"session '{folder}': what it is learned on cannot be kept: {error.strerror or error}") from None
+
+
+def sha256_of(words: Iterable[str]) -> str:
+    """A SHA-256 over the files of tasks, worlds or other files, and over those that they name; the same for none of them."""
+    hashes = [sorted((name, _sha(content)) for name, content in _contents(word).items()) for word in words]
+    return _sha(dumps(hashes).encode())
 
 
 def _contents(word: str) -> dict[str, bytes]:

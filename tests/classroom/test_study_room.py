@@ -13,12 +13,14 @@ import pytest
 from websockets.asyncio.client import ClientConnection
 from websockets.exceptions import InvalidStatus
 
+from lab.advice.entries import read_journal
 from lab.classroom.class_server import ClassServer
+from lab.classroom.holding import closing
 from lab.classroom.participant import Participant
 from lab.classroom.roster import Pupil, Roster
 from lab.classroom.study import PROTOCOL, Study
 from lab.errors import BadInput
-from tests.classroom.conftest import asked, at_page, question, until
+from tests.classroom.conftest import asked, at_page, question, seated, until
 from tests.classroom.scripted import LAST, TLX, Scripted, served, study_in
 
 Json = dict[str, Any]
@@ -43,6 +45,8 @@ def test_participants_go_through_all_arms_and_one_withdraws(server: ClassServer)
         assert person.goes_through()["text"] == "Thanks."
     people[3].goes_through("lesson")
     position = server.roster.study and server.roster.study.positions[3]
+    teacher = server.teacher_url.partition(str(server.port))[2]
+    at_page(server, teacher, lambda page: until(page, lambda news: len(news.get("rows", ())) >= 6))
     assert people[3].says(do="withdraw") == {"kind": "withdrawn"}
 
     kept = [person.kept() for person in people[:3]]
@@ -74,6 +78,56 @@ def test_participants_go_through_all_arms_and_one_withdraws(server: ClassServer)
     assert later.kept()["number"] == 5
     assert server.roster.study is not None
     assert server.roster.study.positions[3:] == [None, position]
+
+
+def test_a_study_with_a_withdrawal_ends_and_goes_on_without_a_trace(server: ClassServer) -> None:
+    first, second = Scripted.agreed(server), Scripted.agreed(server)
+    first.says(do="withdraw")
+    document = closing(server)  # as at the end of the class: table, report and hand-outs are written
+    assert [pupil["name"] for pupil in document["pupils"]] == ["P02"]
+    assert not (server.roster.folder / "01-P01").exists()
+    second.says(do="withdraw")
+    assert not any(b"P02" in content or "P02" in name for name, content in files(server).items())
+
+
+def test_who_ends_a_lesson_has_ended_it_also_after_the_server(server: ClassServer) -> None:
+    person = Scripted.agreed(server)
+    shown = person.goes_through("lesson")
+
+    async def ends(page: ClientConnection) -> object:
+        asks = await seated(page)
+        await page.send(json.dumps({"answer": {"question": asks["number"], "word": "quit"}}))
+        return await until(page, lambda news: news.get("class", {}).get("study", {}).get("over"))
+
+    at_page(server, person.page.replace("/step/", "/desk/"), ends)
+    assert person.state()["over"]
+    server.stop()
+    with served(Study.read(Roster.read(server.roster.folder))) as again:
+        later = Scripted(again, person.page)
+        assert later.state()["over"]
+        assert later.goes_on(shown)["step"] == shown["step"] + 1
+
+
+def test_a_lesson_ends_with_its_last_episode_and_not_with_its_pictures(tmp_path: Path) -> None:
+    with served(study_in(tmp_path, **{"time_limit_s = 1": "time_limit_s = 60"})) as server:
+        person = Scripted.agreed(server)
+        person.goes_through("lesson")
+        person.lesson()
+        ended = person.kept()["steps"][-1]
+        assert (ended["ended"] is not None, ended["timed_out"]) == (True, False)
+        person.goes_through("questionnaire")
+        teacher = server.teacher_url.partition(str(server.port))[2]
+        at_page(server, teacher, lambda page: until(page, lambda news: news.get("rows")))  # it is kept nevertheless
+        folder = server.roster.folder / "01-P01" / f"lesson-{ended['lesson']}"
+        assert read_journal(folder, "test").closed is not None
+
+
+def test_a_study_whose_world_was_changed_does_not_go_on(server: ClassServer, tmp_path: Path) -> None:
+    Scripted.agreed(server)
+    server.stop()
+    (tmp_path / "small.txt").write_text("S..G\n....\n")
+    with pytest.raises(BadInput, match=r"small.txt.*changed since the study began"):
+        Study.read(Roster.read(server.roster.folder))
 
 
 def test_nothing_is_kept_before_the_consent_and_nothing_after_the_withdrawal(server: ClassServer) -> None:
@@ -195,7 +249,7 @@ def test_a_step_ends_once_and_not_before_it_may(server: ClassServer) -> None:
     after = person.goes_on(shown, answers=LAST | {"note": "<b>\ud800"})
     assert person.kept()["steps"][0]["answers"]["note"] == "<b>?"
     status, said = person.tries(do="go on", step=shown["step"], answers=LAST)
-    assert (status, "already" in said["error"]) == (409, True)
+    assert (status, "You are at step" in said["error"]) == (409, True)
     while after["kind"] != "lesson" or person.arm() == "c":
         after = person.goes_through("lesson")
         if person.arm() == "c":
