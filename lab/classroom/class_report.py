@@ -13,6 +13,7 @@ from lab.classroom.class_record import LessonRecord, Number, TaughtLesson, class
 from lab.classroom.curve_chart import Chart, Curve, Kind, chart_of
 from lab.classroom.roster import Pupil, Roster
 from lab.classroom.tile import COLUMNS
+from lab.classroom.turn_record import kept_rows
 from lab.errors import BadInput, counted
 from lab.files import csv_of, write_whole
 from lab.lazy import jinja2
@@ -227,7 +228,7 @@ def write_report(roster: Roster, rows: Sequence[Json] | None = None) -> Json:
     """
     records, pupils, title = class_record(roster), [*roster.pupils], title_of_class(roster)
     if rows is None:
-        rows = [asdict(row) for record in records for row in record.finished]
+        rows = [asdict(row) for record in records for row in record.finished] + kept_rows(roster)
     handed = hand_outs(records, pupils)
     pages = {
         TABLE: csv_of(rows, COLUMNS),

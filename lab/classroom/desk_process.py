@@ -18,11 +18,13 @@ from lab.advice.advisors import PAGE_OF
 from lab.advice.answer_times import AnswerTimes
 from lab.advice.entries import FILE, is_unbegun, read_journal
 from lab.classroom.class_lesson import ClassLesson
+from lab.classroom.operate_lesson import operated_lesson
 from lab.classroom.order_lesson import order_lesson
 from lab.errors import LabError
 from lab.files import is_file
 from lab.operating_system import own_session
 from lab.plugins.code_file import files_taken
+from lab.production.run_options import RunOptions
 from lab.seat.lesson_seat import LessonSeat
 from lab.seat.page.teaching_page import SeatPage
 from lab.seat.run_progress import RunProgress
@@ -37,6 +39,7 @@ from lab.teaching.teacher import Teacher
 from lab.toolbox.registry import Toolbox
 from lab.view.progress import EscapingConsole
 
+FINISH = "finish"  # what the class sends to finish a run by hand; anything else closes the desk
 RESUMED = "lab class --resume"  # where a journal is named, for errors
 LAST_S = 10.0  # time for a lesson to end after its pipe has closed
 
@@ -73,9 +76,9 @@ def sit(order: DeskOrder, pipe: Connection) -> None:
         with ExitStack() as stack:
             pages = {name: stack.enter_context(SeatPage()) for name in _people(order) or [""]}
             pipe.send(("pages", {name: (page.port, page.token) for name, page in pages.items()}))
-            closed = threading.Event()
-            threading.Thread(target=_until_closed, args=[pipe, closed], daemon=True).start()
-            said = _taught(order, pages)
+            closed, finish = threading.Event(), threading.Event()
+            threading.Thread(target=_until_closed, args=[pipe, closed, finish], daemon=True).start()
+            said = _taught(order, pages, finish)
             with suppress(OSError):
                 pipe.send(said)
             closed.wait()  # the pages go on showing how it ended, until the class closes the desk
@@ -95,9 +98,9 @@ def _people(order: DeskOrder) -> list[str]:
     return [name.removeprefix(PAGE_OF) for name in options.advisor_names]
 
 
-def _taught(order: DeskOrder, pages: Mapping[str, SeatPage]) -> tuple[Any, ...]:
+def _taught(order: DeskOrder, pages: Mapping[str, SeatPage], finish: threading.Event) -> tuple[Any, ...]:
     try:
-        return "over", _lesson(order, pages)
+        return "over", _lesson(order, pages, finish)
     except KeyboardInterrupt as stopped:  # Interrupted, too, which is one
         return "stopped", str(stopped)
     except LabError as error:
@@ -106,8 +109,8 @@ def _taught(order: DeskOrder, pages: Mapping[str, SeatPage]) -> tuple[Any, ...]:
         return "failed", str(error)
 
 
-def _lesson(order: DeskOrder, pages: Mapping[str, SeatPage]) -> Mapping[str, Any]:
-    """The document of `lab teach --json`, or of `lab sequence --json` for a lesson on an order."""
+def _lesson(order: DeskOrder, pages: Mapping[str, SeatPage], finish: threading.Event) -> Mapping[str, Any]:
+    """The document of `lab teach --json`, of `lab sequence --json` for a lesson on an order, or of `lab operate --json`."""
     take_again(order.files)
     with ExitStack() as stack:
         team = (
@@ -119,6 +122,8 @@ def _lesson(order: DeskOrder, pages: Mapping[str, SeatPage]) -> Mapping[str, Any
         seat = LessonSeat(RunProgress(EscapingConsole(quiet=True)), None, pages.get(""), team=team, times=times)
         stack.callback(seat.clear_scene)
         toolbox = Toolbox(str(order.toolbox))
+        if isinstance(order.options, RunOptions):
+            return operated_lesson(order.options, order.folder, toolbox, seat, pages[""], finish)
         if isinstance(order.options, OrderSessionOptions):
             return order_lesson(order.options, order.folder, toolbox, seat)
         options = order.options if team is None else replace(order.options, advisors=tuple(team.pages))
@@ -141,10 +146,11 @@ def _table_lesson(order: DeskOrder, options: LessonOptions, toolbox: Toolbox, se
     return document
 
 
-def _until_closed(pipe: Connection, closed: threading.Event) -> None:
+def _until_closed(pipe: Connection, closed: threading.Event, finish: threading.Event) -> None:
     """Interrupt the lesson when the pipe closes; if it does not end within a few seconds, end the process."""
     with suppress(EOFError, OSError):
-        pipe.recv()
+        while pipe.recv() == FINISH:
+            finish.set()
     closed.set()
     interrupt_main()
     threading.Event().wait(LAST_S)

@@ -192,6 +192,13 @@ class Room:
             return "Your teacher has paused the class."
         return "Your teacher answers for you now." if number in self._helped else ""
 
+    async def passes(self, page: PupilPage, message: str) -> bool:
+        """Whether a message of a page goes to the desk, as all of the teacher's do; the page is told why one does not."""
+        refusal = "" if page in self.shoulders else self.refusal(page.number)
+        if refusal:
+            await page.send(json.dumps({"refusal": refusal}))
+        return not refusal
+
     def _show(self, number: int) -> None:
         """Tell a pupil's page what the class says: lesson, pause, hint, help."""
         page, pupil = self.pages.get(number), self.roster.pupils[number - 1]
@@ -343,6 +350,10 @@ class Room:
     def teams(self) -> list[Json]:
         """What the teacher sees of each team; none in a class without teams."""
         return []
+
+    def turns(self) -> Json | None:
+        """What the teacher sees of a run that pupils operate in turns; None in any other class."""
+        return None
 
     def _document(self, learner: Pupil, lesson: int) -> Json | None:
         if lesson == learner.lesson:

@@ -13,8 +13,17 @@ if TYPE_CHECKING:
     from lab.api.scenes import seen
     from lab.audit.audit import audit, kept_evidence
     from lab.classroom.class_lesson import ADVISORS as PUPILS
+    from lab.classroom.class_lesson import OPERATE as OPERATE_LESSON
     from lab.classroom.class_lesson import ORDER as ORDER_LESSON
-    from lab.classroom.class_lesson import ClassLesson, check_lesson, module_of, name_of, order_lesson_named
+    from lab.classroom.class_lesson import (
+        ClassLesson,
+        check_lesson,
+        is_operation,
+        module_of,
+        name_of,
+        operation_named,
+        order_lesson_named,
+    )
     from lab.classroom.class_report import write_report
     from lab.classroom.class_server import ClassServer
     from lab.classroom.code_picture import code_text
@@ -157,8 +166,11 @@ TABLE = {
         "ADVISORS as PUPILS",
         "check_lesson",
         "ClassLesson",
+        "is_operation",
         "module_of",
         "name_of",
+        "OPERATE as OPERATE_LESSON",
+        "operation_named",
         "ORDER as ORDER_LESSON",
         "order_lesson_named",
     ),
