@@ -30,7 +30,16 @@ const classBar = (() => {
   // Of a run that is operated in turns: who operates, and when this pupil does
   function showTurn(turn) {
     el("class-turn").hidden = !turn;
+    el("class").classList.toggle("turns", Boolean(turn));
     if (!turn) return;
+    if (turn.over) {
+      turnUntil = null;
+      el("class-operates").textContent = turn.over;
+      el("class-over").hidden = true;
+      el("class-turn").classList.remove("yours");
+      tickTurn();
+      return;
+    }
     el("class-turn").classList.toggle("yours", turn.yours);
     el("class-operates").textContent = turn.yours ? "Your turn: you operate." : `${turn.name} operates; ${turn.before ? `${turn.before} before you` : "you are next"}.`;
     el("class-over").hidden = !(turn.yours && turn.next);

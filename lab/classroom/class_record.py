@@ -54,9 +54,6 @@ class Row:
     cost: Number
     optimal_cost: Number
     objective: str | None
-    delivered: int | None = None
-    parts: int | None = None
-    commands: int | None = None
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,7 @@ from lab.classroom.step_pages import StepPages
 from lab.classroom.study import Study
 from lab.classroom.study_room import StudyRoom
 from lab.classroom.teacher_messages import obey
-from lab.classroom.tile import COLUMNS
+from lab.classroom.turn_record import columns_of
 from lab.errors import BadInput, WorkFailed
 from lab.files import csv_of
 from lab.view.server import answer_of, config_of, listening
@@ -187,7 +187,7 @@ class ClassServer:
     async def _table(self, request: Request) -> Response:
         if not self._is_teacher(request):
             return PlainTextResponse("This page needs the token of the teacher's address.\n", 403)
-        return Response(csv_of(self.room.rows(), COLUMNS), media_type="text/csv")
+        return Response(csv_of(self.room.rows(), columns_of(self.roster)), media_type="text/csv")
 
     async def _report(self, request: Request) -> Response:
         """The report or the hand-outs of the class at this moment."""

@@ -63,6 +63,7 @@ function showTurns() {
   el("begin").hidden = turns.state !== "idle" || !boxes.size;
   el("finish").hidden = turns.state !== "open";
   el("to-lesson").hidden = el("all").hidden = true;
+  el("report").querySelector("h2").textContent = "What came of the run, and who gave how many commands";
 }
 
 function showTiles(tiles, gone) {
@@ -105,11 +106,11 @@ function showRows(rows) {
     made.append(...cells.map((text) => make(kind, text)));
     return made;
   };
-  const heads = HEADS.filter(([name]) => rows.some((row) => row[name] !== null));
+  const heads = HEADS.filter(([name]) => rows.some((row) => (row[name] ?? null) !== null));
   el("report").querySelector("thead").replaceChildren(line(heads.map(([, head]) => head), "th"));
   el("report").querySelector("tbody").replaceChildren(...rows.map((row, k) => {
-    const made = line(heads.map(([name]) => shown(row[name])), "td");
-    if (row.solved && row.commands === null && (k === 0 || rows[k - 1].lesson !== row.lesson)) made.className = "first";
+    const made = line(heads.map(([name]) => shown(row[name] ?? null)), "td");
+    if (row.solved && row.commands === undefined && (k === 0 || rows[k - 1].lesson !== row.lesson)) made.className = "first";
     return made;
   }));
 }

@@ -13,7 +13,6 @@ COLUMNS = (
     *("pupil", "name", "lesson", "skill", "state", "episodes", "solved", "final_steps", "optimal_steps"),
     *("answers", "own_choice_too", "not_best", "helped_steps", "guided_episodes", "misleads", "believed", "tau"),
     *("cost", "optimal_cost", "objective"),  # of a lesson on an order
-    *("delivered", "parts", "commands"),  # of a run by hand
 )
 
 

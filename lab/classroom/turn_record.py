@@ -18,6 +18,7 @@ RUN = "run"  # the folder of the run, in that of the class
 COMMANDS = (
     "commands.jsonl"  # in the folder of the run: a line for each command, as {"pupil": 2, "command": "jog +z 20"}
 )
+RUN_COLUMNS = ("pupil", "name", "lesson", "skill", "state", "solved", "delivered", "parts", "commands")
 MOST_WORDS = 80  # characters of a command
 MOST_BYTES = 1 << 26
 
@@ -48,7 +49,7 @@ def rows_of_run(
 
     document: of `lab operate --json`. commands: by the pupils' numbers.
     """
-    shared = dict.fromkeys(COLUMNS) | {
+    shared = {
         "lesson": 1,
         "skill": f"{document['task']} by hand",
         "state": "over",
@@ -60,6 +61,11 @@ def rows_of_run(
         shared | {"pupil": pupil.number, "name": pupil.name, "commands": commands.get(pupil.number, 0)}
         for pupil in pupils
     ]
+
+
+def columns_of(roster: Roster) -> tuple[str, ...]:
+    """The columns of the table of a class."""
+    return RUN_COLUMNS if is_operation(roster.lessons) else COLUMNS
 
 
 def kept_rows(roster: Roster) -> list[dict[str, Any]]:

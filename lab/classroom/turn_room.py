@@ -13,6 +13,7 @@ from lab.errors import BadInput
 from lab.production.run_journal import is_run
 from lab.seat.page.page_console import STOP
 from lab.seat.page.page_messages import LayerChoice, Message, PageCommand, Refused, Wish, understood
+from lab.view.summary import delivered_in_words
 
 AWAY_S = 20.0  # after which the turn of a pupil whose page is closed passes on
 HAND_OVER = '{"class":"hand over"}'  # as it comes from the class's own part of a pupil's page
@@ -200,7 +201,11 @@ class TurnRoom(Room):
         return number == self._turn
 
     def told_more(self, number: int) -> Json:
-        """Whose turn it is, how many come before this pupil, who is next, and how long [s] it lasts still, None: no limit."""
+        """Whose turn it is, how many come before this pupil, who is next, how long [s] it lasts still; or how the run ended."""
+        over = self._desk.result if self._desk is not None else None
+        if over is not None:
+            made = delivered_in_words(over["delivered"], over["parts"])
+            return {"turn": {"over": f"The run is over: {made}."}}
         if not self._is_open or self._turn is None:
             return {"turn": None}
         row = self._row()
