@@ -60,7 +60,7 @@ def name_of(lesson: ClassLesson) -> str:
 
 
 def title_of(lesson: ClassLesson) -> str:
-    """A lesson for people, such as "insert of toast", "world-1" "order of toast-case-1", or "toast by hand"."""
+    """A lesson for people, such as "insert of toast", "world-1", "order of toast-case-1" or "toast by hand"."""
     if isinstance(lesson, RunOptions):
         return f"{lesson.task} by hand"
     if isinstance(lesson, OrderSessionOptions):

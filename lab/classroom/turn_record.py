@@ -37,8 +37,8 @@ def counted_commands(folder: Path) -> Counter[int]:
     with suppress(OSError, BadInput):
         for line in read_limited(path, MOST_BYTES).splitlines():
             with suppress(ValueError, KeyError, TypeError, RecursionError):
-                pupil = json_of(line)["pupil"]
-                counts[pupil] += 1 if type(pupil) is int else 0
+                if type(pupil := json_of(line)["pupil"]) is int:
+                    counts[pupil] += 1
     return counts
 
 

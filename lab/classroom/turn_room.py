@@ -2,10 +2,12 @@
 
 import asyncio
 import json
+import time
 from contextlib import suppress
 
 from lab.classroom.desk import Desk
 from lab.classroom.desk_process import DeskOrder
+from lab.classroom.door import Often
 from lab.classroom.room import RELOAD, Json, PupilPage, Room
 from lab.classroom.roster import Pupil, Roster
 from lab.classroom.turn_record import RUN, counted_commands, keep_command, rows_of_run
@@ -15,6 +17,10 @@ from lab.seat.page.page_console import STOP
 from lab.seat.page.page_messages import LayerChoice, Message, PageCommand, Refused, Wish, understood
 from lab.view.summary import delivered_in_words
 
+MOST_COMMANDS, COMMANDS_S = (
+    100,
+    10.0,
+)  # commands of a pupil that are passed on in so many seconds: a journal holds all of them
 AWAY_S = 20.0  # after which the turn of a pupil whose page is closed passes on
 HAND_OVER = '{"class":"hand over"}'  # as it comes from the class's own part of a pupil's page
 
@@ -31,7 +37,10 @@ class TurnRoom(Room):
         self._desk: Desk | None = None
         self._turn: int | None = None  # the pupil who operates
         self._ends_s = 0.0  # when the turn passes on, in the event loop's time
-        self._alarms: list[asyncio.TimerHandle] = []  # that pass the turn on
+        self._alarms: dict[
+            str, asyncio.TimerHandle
+        ] = {}  # that pass the turn on: when its "time" is up, its pupil is "away"
+        self._often: dict[int, Often] = {}  # how often a pupil has given commands lately
         self._folder = roster.folder / RUN
         self._commands = counted_commands(self._folder)
 
@@ -124,8 +133,12 @@ class TurnRoom(Room):
             self._pass_to(min(self.pages))
 
     def _disarm(self) -> None:
-        while self._alarms:
-            self._alarms.pop().cancel()
+        for what in [*self._alarms]:
+            self._alarms.pop(what).cancel()
+
+    def _await_back(self) -> None:
+        """Begin the time in which the pupil whose turn it is has to come back."""
+        self._alarms["away"] = asyncio.get_running_loop().call_later(AWAY_S, self._look_away)
 
     def _arm(self) -> None:
         """Begin the time of a turn."""
@@ -133,9 +146,9 @@ class TurnRoom(Room):
         loop = asyncio.get_running_loop()
         if self.roster.turn_s:
             self._ends_s = loop.time() + self.roster.turn_s
-            self._alarms.append(loop.call_later(self.roster.turn_s, self._time_up))
+            self._alarms["time"] = loop.call_later(self.roster.turn_s, self._time_up)
         if self._turn not in self.pages:
-            self._alarms.append(loop.call_later(AWAY_S, self._look_away))
+            self._await_back()
 
     def _time_up(self) -> None:
         """The time of a turn is up: it passes on, unless the class is paused or nobody else is here."""
@@ -154,6 +167,8 @@ class TurnRoom(Room):
     def arrived(self, page: PupilPage) -> None:
         """A pupil's page is open."""
         super().arrived(page)
+        if page.number == self._turn and "away" in self._alarms:
+            self._alarms.pop("away").cancel()
         self._first_turn()
         self._show_all()
 
@@ -161,7 +176,7 @@ class TurnRoom(Room):
         """A pupil's page was closed; whose turn it is has a while to come back."""
         super().left(page)
         if page.number == self._turn and page.number not in self.pages and not self.ended.is_set():
-            self._alarms.append(asyncio.get_running_loop().call_later(AWAY_S, self._look_away))
+            self._await_back()
         self._show_all()
 
     def refusal(self, number: int) -> str:
@@ -191,6 +206,11 @@ class TurnRoom(Room):
                 await page.send(json.dumps({"refusal": "Nobody else is here: you go on."}))
             return False
         if isinstance(meant, PageCommand) and self._is_open:
+            often, now_s = self._often.setdefault(page.number, Often(MOST_COMMANDS, COMMANDS_S)), time.monotonic()
+            if often.is_full(now_s):
+                await page.send(json.dumps({"refusal": "Too many commands within seconds: wait a moment."}))
+                return False
+            often.happened(now_s)
             self._commands[page.number] += 1
             keep_command(self._folder, page.number, meant.words)
             self.on_news()
