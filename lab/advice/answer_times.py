@@ -3,17 +3,19 @@
 The journal alone reproduces a session, and holds no times: with the same answers it has the same bytes.
 """
 
+from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any
 
-from annotated_types import Ge, Le, Predicate
+from annotated_types import Ge, Le
+from pydantic import AfterValidator
 
 from lab.advice.entries import Name
 from lab.advice.journal import Journal
 from lab.advice.json_lines import AppendedFile, EntryKinds
-from lab.errors import BadInput
+from lab.errors import BadInput, shortened
 from lab.files import read_limited
 
 FILE = "times.jsonl"
@@ -35,15 +37,15 @@ MEANS = {  # by which an answer is given -> what that is
 }
 
 
-def is_moment(text: str) -> bool:
-    """Whether a text is a date and time as ISO 8601 with a zone."""
-    try:
-        return datetime.fromisoformat(text).tzinfo is not None
-    except ValueError:
-        return False
+def moment(text: str) -> str:
+    """The text itself. Raises ValueError unless it is a date and time as ISO 8601 with a zone."""
+    with suppress(ValueError):
+        if datetime.fromisoformat(text).tzinfo is not None:
+            return text
+    raise ValueError(f"'{shortened(text)}' is no date and time with a zone, such as 2026-11-28T19:00:00.123Z")
 
 
-Moment = Annotated[str, Predicate(is_moment)]
+Moment = Annotated[str, AfterValidator(moment)]
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,11 @@
 """A lesson of a class: one of `lab teach`, advice on an order, as `lab sequence` asks for it, or a run of `lab operate`."""
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from lab.errors import BadInput
+from lab.files import is_file
 from lab.gym import parse_name
 from lab.production.order_session import check_order_session
 from lab.production.run_options import RunOptions
@@ -62,10 +64,15 @@ def name_of(lesson: ClassLesson) -> str:
 def title_of(lesson: ClassLesson) -> str:
     """A lesson for people, such as "insert of toast", "world-1", "order of toast-case-1" or "toast by hand"."""
     if isinstance(lesson, RunOptions):
-        return f"{lesson.task} by hand"
+        return f"{_shown(lesson.task)} by hand"
     if isinstance(lesson, OrderSessionOptions):
-        return f"order of {lesson.task}"
-    return f"{lesson.subtask} of {lesson.task}" if lesson.task else lesson.subtask
+        return f"order of {_shown(lesson.task)}"
+    return f"{lesson.subtask} of {_shown(lesson.task)}" if lesson.task else _shown(lesson.subtask)
+
+
+def _shown(name: str) -> str:
+    """A name for people: of a file, its name alone, whose folders are the teacher's own business."""
+    return Path(name).name if Path(name).suffix and is_file(name) else name
 
 
 def module_of(lesson: ClassLesson) -> str:

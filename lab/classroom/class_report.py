@@ -55,7 +55,7 @@ def how_it_ended(one: TaughtLesson, about_order: bool) -> str:
         return f"still learning after {counted(len(one.curve), 'episode')}"
     if about_order:
         return "found a best order" if row.solved else "its order is not proven the best"
-    return "reached its goal" if row.solved else "did not reach its goal"
+    return "solved" if row.solved else "not solved"
 
 
 def what_was_believed(one: TaughtLesson) -> str:
@@ -210,9 +210,9 @@ def title_of_class(roster: Roster) -> str:
 
 def page_now(roster: Roster, name: str) -> str:
     """The report or the hand-outs of a class at this moment; name: REPORT or HAND_OUTS."""
-    records, pupils, title = class_record(roster), [*roster.pupils], title_of_class(roster)
+    records, pupils, title = class_record(roster), roster.learners, title_of_class(roster)
     if name == REPORT:
-        return report_page(title, records, len(pupils))
+        return report_page(title, records, len(roster.present))
     return hand_out_page(title, hand_outs(records, pupils))
 
 
@@ -225,13 +225,13 @@ def write_report(roster: Roster, rows: Sequence[Json] | None = None) -> Json:
     rows: of the finished lessons (see `lab.classroom.tile.row_of`), None for those that the folder tells. Raises BadInput if a
     file cannot be written.
     """
-    records, pupils, title = class_record(roster), [*roster.pupils], title_of_class(roster)
+    records, pupils, title = class_record(roster), roster.learners, title_of_class(roster)
     if rows is None:
         rows = [asdict(row) for record in records for row in record.finished] + kept_rows(roster)
     handed = hand_outs(records, pupils)
     pages = {
         TABLE: csv_of(rows, columns_of(roster)),
-        REPORT: report_page(title, records, len(pupils)),
+        REPORT: report_page(title, records, len(roster.present)),
         HAND_OUTS: hand_out_page(title, handed),
     }
     pages |= {f"{one[0].folder}/{HAND_OUT}": hand_out_page(title, [one]) for one in handed}

@@ -4,70 +4,27 @@ A participant's lesson counts as far as it came: also where the time was up, or 
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import datetime, timedelta
 from hashlib import sha256
 from pathlib import Path
 from statistics import mean, median
-from typing import Any, Literal
+from typing import Any
 
-from pydantic import FiniteFloat, TypeAdapter, ValidationError
-
-from lab.advice.answer_times import AnswerTime, Moment, read_times
+from lab.advice.answer_times import AnswerTime, read_times
 from lab.advice.entries import FILE as JOURNAL
 from lab.advice.entries import Answer, Closed, Entry, Praise, Read, Undone, is_unbegun, read_journal, undoable
-from lab.classroom.roster import FILE as ROSTER
-from lab.classroom.roster import clean_name
+from lab.classroom.participant import Participant, Step
+from lab.classroom.roster import Roster
+from lab.classroom.study import PROTOCOL
 from lab.errors import BadInput
 from lab.files import is_file, json_of, read_limited
 from lab.learning.session_events import AdviceGiven, AdviceRejected, EpisodeEnded
 
 Row = dict[str, Any]
-PARTICIPANT, PROTOCOL, RECEIPT = "participant.json", "protocol.toml", "receipt.json"
+RECEIPT = "receipt.json"
 MOST_BYTES = 1 << 24
 TLX = "tlx"  # in the name of a questionnaire whose mean is the raw task load
-
-
-@dataclass(frozen=True)
-class _Pupil:
-    number: int
-    name: str
-
-
-@dataclass(frozen=True)
-class _Roster:
-    """What the rows need of class.json."""
-
-    format: Literal["teaching-lab class 1"]
-    lessons: list[dict[str, Any]]
-    pupils: list[_Pupil]
-
-
-@dataclass(frozen=True)
-class Step:
-    """A step of a participant of a study, as `participant.json` has it; began, ended: ISO 8601, UTC."""
-
-    kind: Literal["text", "lesson", "questionnaire"]
-    name: str
-    arm: str | None
-    lesson: int | None
-    began: Moment
-    ended: Moment | None = None
-    timed_out: bool = False
-    answers: dict[str, int | FiniteFloat | str | bool | None] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Participant:
-    """A participant of a study, as `participant.json` has it; order: the names of the arms in this participant's order."""
-
-    format: Literal["teaching-lab participant 1"]
-    participant: str
-    number: int
-    order: list[str]
-    consented: str
-    finished: str | None = None
-    steps: list[Step] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -94,30 +51,19 @@ class ClassRows:
 
 def rows_of(folder: Path, where: str = "DIR") -> ClassRows:
     """The rows of the class in a folder. Raises BadInput if there is none, or if a file of it is damaged."""
-    roster = _read(folder / ROSTER, _Roster, f"'{folder}' ({where}) holds no class: a folder of lab class is wanted")
-    assert isinstance(roster, _Roster)
-    protocol = ""
-    if is_file(folder / PROTOCOL):
-        protocol = _text(folder / PROTOCOL)
+    roster = Roster.read(folder, where)
+    protocol = _text(folder / PROTOCOL) if roster.study is not None else ""
     lessons, answers, asked = list[Row](), list[Row](), dict[str, tuple[str, str]]()
-    present = [pupil for pupil in roster.pupils if pupil.name]
-    for pupil in present:
-        if clean_name(pupil.name) != pupil.name:
-            raise BadInput(
-                f"class '{folder / ROSTER}': pupil {pupil.number} is called {pupil.name!r}: its file was edited"
-            )
-        place = folder / f"{pupil.number:02}-{pupil.name.replace(' ', '-')}"
-        person = None
-        if is_file(place / PARTICIPANT):
-            person = _read(place / PARTICIPANT, Participant, "")
-        if person is None and protocol:
-            continue  # has not agreed yet
-        one = {"participant": pupil.name, "number": pupil.number}
+    for learner in roster.learners:
+        place = folder / learner.folder
+        person = None if roster.study is None else Participant.read(place, learner.number, learner.name)
+        one = {"participant": learner.name, "number": learner.number}
         for head, step in _lessons_of(place, person):
             own, given = _lesson(place, one | head, step)
             lessons.append(own | _questionnaires(person, head, asked))
             answers += given
-    return ClassRows(lessons, answers, asked, len(present), len(roster.pupils) - len(present), protocol)
+    present = len(roster.present)
+    return ClassRows(lessons, answers, asked, present, len(roster.pupils) - present, protocol)
 
 
 def _text(path: Path) -> str:
@@ -125,18 +71,6 @@ def _text(path: Path) -> str:
         return read_limited(path, MOST_BYTES).decode("utf-8", "replace")
     except OSError as error:
         raise BadInput(f"'{path}' cannot be read: {error.strerror or error}") from None
-
-
-def _read(path: Path, kind: type[Any], missing: str) -> Any:
-    """The record in a JSON file. Raises BadInput, with the text `missing` if there is no such file."""
-    if not is_file(path):
-        raise BadInput(missing)
-    try:
-        return TypeAdapter(kind).validate_json(_text(path))
-    except ValidationError as error:
-        why = error.errors(include_url=False)[0]
-        at = ".".join(map(str, why["loc"]))
-        raise BadInput(f"'{path}': {at}: {why['msg']}: a file of lab class is wanted") from None
 
 
 def _lessons_of(place: Path, person: Participant | None) -> Iterator[tuple[Row, Step | None]]:

@@ -20,10 +20,11 @@ from lab.advice.entries import FILE, is_unbegun, read_journal
 from lab.classroom.class_lesson import ClassLesson
 from lab.classroom.operate_lesson import operated_lesson
 from lab.classroom.order_lesson import order_lesson
-from lab.errors import LabError
+from lab.errors import BadInput, LabError
 from lab.files import is_file
 from lab.operating_system import own_session
 from lab.plugins.code_file import files_taken
+from lab.production.run_journal import RunEnded, is_run, read_run
 from lab.production.run_options import RunOptions
 from lab.seat.lesson_seat import LessonSeat
 from lab.seat.page.teaching_page import SeatPage
@@ -77,7 +78,7 @@ def sit(order: DeskOrder, pipe: Connection) -> None:
             pages = {name: stack.enter_context(SeatPage()) for name in _people(order) or [""]}
             pipe.send(("pages", {name: (page.port, page.token) for name, page in pages.items()}))
             closed, finish = threading.Event(), threading.Event()
-            threading.Thread(target=_until_closed, args=[pipe, closed, finish], daemon=True).start()
+            threading.Thread(target=_until_closed, args=[pipe, closed, finish, order.folder], daemon=True).start()
             said = _taught(order, pages, finish)
             with suppress(OSError):
                 pipe.send(said)
@@ -134,8 +135,7 @@ def _table_lesson(order: DeskOrder, options: LessonOptions, toolbox: Toolbox, se
     """The document of `lab teach --json`; a lesson that is over, whose document was lost, is run again from its journal."""
     kept = None
     if is_file(order.folder / FILE):
-        is_over = not is_unbegun(order.folder / FILE) and read_journal(order.folder, RESUMED).closed is not None
-        kept = KeptSession(order.folder, RESUMED, read_only=is_over, trusted=order.modules)
+        kept = KeptSession(order.folder, RESUMED, read_only=_is_over(order.folder), trusted=order.modules)
         options = kept.options
     else:
         check_new(order.folder)
@@ -146,12 +146,27 @@ def _table_lesson(order: DeskOrder, options: LessonOptions, toolbox: Toolbox, se
     return document
 
 
-def _until_closed(pipe: Connection, closed: threading.Event, finish: threading.Event) -> None:
-    """Interrupt the lesson when the pipe closes; if it does not end within a few seconds, end the process."""
+def _is_over(folder: Path) -> bool:
+    """Whether the session, or the run by hand, in a folder has ended."""
+    with suppress(BadInput):
+        if is_run(folder):
+            _, entries, _ = read_run(folder, RESUMED)
+            return any(isinstance(entry, RunEnded) for entry in entries[-1:])
+        journal = folder / FILE
+        return is_file(journal) and not is_unbegun(journal) and read_journal(folder, RESUMED).closed is not None
+    return False
+
+
+def _until_closed(pipe: Connection, closed: threading.Event, finish: threading.Event, folder: Path) -> None:
+    """Interrupt the lesson in a folder when the pipe closes, unless it is over and its document is about to come.
+
+    If it does not end within a few seconds, end the process.
+    """
     with suppress(EOFError, OSError):
         while pipe.recv() == FINISH:
             finish.set()
     closed.set()
-    interrupt_main()
+    if not _is_over(folder):
+        interrupt_main()
     threading.Event().wait(LAST_S)
     os._exit(1)

@@ -9,6 +9,7 @@ from typing import Final, Literal
 
 from pydantic import TypeAdapter, ValidationError
 
+from lab.advice.answer_times import Moment
 from lab.classroom.questionnaire import Answer
 from lab.classroom.study_protocol import Kind, PlannedStep
 from lab.errors import BadInput
@@ -27,8 +28,8 @@ class Step:
     name: str
     arm: str | None
     lesson: int | None
-    began: str
-    ended: str | None = None
+    began: Moment
+    ended: Moment | None = None
     timed_out: bool = False
     answers: dict[str, Answer] = field(default_factory=dict)
 
@@ -51,8 +52,8 @@ class Participant:
     participant: str
     number: int
     order: list[str]
-    consented: str
-    finished: str | None = None
+    consented: Moment
+    finished: Moment | None = None
     steps: list[Step] = field(default_factory=list)
 
     @classmethod
@@ -61,21 +62,12 @@ class Participant:
         path = folder / FILE
         try:
             read = TypeAdapter(cls).validate_json(read_limited(path, MOST_BYTES), strict=True)
-            for at in (
-                read.consented,
-                read.finished,
-                *(time for step in read.steps for time in (step.began, step.ended)),
-            ):
-                if at is not None:
-                    seconds_since(at)
         except OSError as error:
             raise BadInput(f"participant '{path}': {error.strerror or error}") from None
         except ValidationError as error:
             why = error.errors(include_url=False)[0]
             at = ".".join(map(str, why["loc"]))
             raise BadInput(f"participant '{path}': {at}: {why['msg']}: a file of lab class --study is wanted") from None
-        except ValueError as error:
-            raise BadInput(f"participant '{path}': {error}: a file of lab class --study is wanted") from None
         if (read.number, read.participant) != (number, name):
             raise BadInput(f"participant '{path}' is {read.participant} ({read.number}): wanted {name} ({number})")
         return read
@@ -114,8 +106,5 @@ def timestamp() -> str:
 
 
 def seconds_since(at: str) -> float:
-    """The time [s] that has passed since a timestamp. Raises ValueError for text that is none."""
-    then = datetime.datetime.fromisoformat(at)
-    if then.tzinfo is None:
-        raise ValueError(f"time '{at[:40]}' without a zone")
-    return (datetime.datetime.now(datetime.UTC) - then).total_seconds()
+    """The time [s] that has passed since a timestamp."""
+    return (datetime.datetime.now(datetime.UTC) - datetime.datetime.fromisoformat(at)).total_seconds()

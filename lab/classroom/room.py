@@ -17,6 +17,7 @@ from lab.classroom.roster import Pupil, Roster
 from lab.classroom.tile import best_first, row_of, tile_of
 from lab.errors import BadInput
 from lab.files import is_file, write_whole
+from lab.seat.page.page_state import LESSON_OVER
 
 Json = dict[str, Any]
 MOST_HINT = 200  # characters
@@ -143,19 +144,29 @@ class Room:
 
     def _stirred(self, number: int, desk: Desk) -> None:
         """Something of a desk has changed: keep a finished lesson, note when a question came."""
+        self._keep_lesson(desk)
         if self.desks.get(number) is not desk:
             return  # it was closed, and another one is in its place
         self._pose(number, desk)
-        if desk.state == "over" and desk.parts.get("ended") and not is_file(desk.order.folder / KEPT):
-            kept = {"document": desk.result, "page": desk.parts}
-            with suppress(OSError):  # a full disk: the journal has been written, and the lesson is over anyway
-                write_whole(desk.order.folder / KEPT, json.dumps(kept).encode())
         if desk.state == "lost" and not (self.ended.is_set() or desk.is_closed):
             lesson = (number, self.roster.pupils[number - 1].lesson)
             self._lost[lesson] += 1
             if self._lost[lesson] <= MOST_LOST:
                 self.open_again(number)
         self.on_news()
+
+    def _keep_lesson(self, desk: Desk) -> None:
+        """Keep a lesson that is over, once its page has said so or the desk is being closed."""
+        if desk.state != "over" or is_file(desk.order.folder / KEPT):
+            return
+        page = desk.parts
+        if not page.get("ended"):
+            if not desk.is_closed or desk.result is None:
+                return
+            page = page | {"question": None, "receipt": desk.result.get("receipt"), "ended": LESSON_OVER}
+        with suppress(OSError):  # a full disk: the journal has been written, and the lesson is over anyway
+            write_whole(desk.order.folder / KEPT, json.dumps({"document": desk.result, "page": page}).encode())
+        self._finished.clear()
 
     def _pose(self, number: int, desk: Desk) -> None:
         """Note when a question has come to a pupil."""

@@ -16,6 +16,7 @@ from lab.learning.requests import AdviceRequest, Ask, Reply, Request
 from lab.learning.session_events import EpisodeEnded
 from lab.mdp import FloatArray
 from lab.seat.grid_text import skill_of
+from lab.seat.page.page_state import LESSON_OVER
 from lab.seat.replay_pace import ReplayPace
 from lab.seat.run_progress import RunProgress
 from lab.seat.spoken_answers import SpokenAnswers
@@ -186,7 +187,7 @@ class LessonSeat:
         """The lesson, or its replay, is over: show the final receipt on the page."""
         for page in self._pages:
             page.receipt(document["receipt"])
-            page.finished("The lesson is over.")
+            page.finished(LESSON_OVER)
 
     # ---- questions
 

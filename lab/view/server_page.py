@@ -14,6 +14,7 @@ from typing import Any, Protocol
 
 from starlette.websockets import WebSocketDisconnect
 from uvicorn.protocols.http.h11_impl import H11Protocol
+from uvicorn.protocols.utils import ClientDisconnected
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 from lab.operating_system import most_descriptors
@@ -167,7 +168,9 @@ class LimitedSocket(WebSocketsSansIOProtocol):
         self.transport.abort()
 
     async def send(self, message: Any) -> None:
-        """Send, or close; a browser that does not take the end is cut off."""
+        """Send, or close; a browser that does not take the end is cut off. Raises OSError once the connection is closing."""
+        if message["type"] == "websocket.send" and self.transport.is_closing():
+            raise ClientDisconnected  # asyncio would warn, on the terminal, of writing to it
         await super().send(message)
         if message["type"] == "websocket.close":
             self.loop.call_later(self.close_timeout, self.transport.abort)

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Sequence
 from contextlib import suppress
+from hashlib import sha256
 from pathlib import Path
 from shutil import copytree
 from typing import Any
@@ -60,10 +61,10 @@ def step(
     return one | {"answers": {}} | more
 
 
-def made_class(folder: Path, pupils: Sequence[str], lessons: int) -> Path:
-    """A class with these pupils, "" for who has withdrawn, each with nothing yet."""
+def made_class(folder: Path, pupils: Sequence[str], lessons: int, protocol: str = "") -> Path:
+    """A class or a study with these pupils, "" for who has withdrawn, each with nothing yet."""
     options = LessonOptions("world-1", advisors=("web",)).to_json()
-    roster = {
+    roster: dict[str, Any] = {
         "format": "teaching-lab class 1",
         "code": "abcdef",
         "lessons": [options] * lessons,
@@ -76,6 +77,10 @@ def made_class(folder: Path, pupils: Sequence[str], lessons: int) -> Path:
         ],
     }
     folder.mkdir()
+    if protocol:
+        digest = sha256(protocol.encode()).hexdigest()
+        roster["study"] = {"protocol_sha256": digest, "positions": [None if not name else 0 for name in pupils]}
+        (folder / "protocol.toml").write_text(protocol)
     (folder / "class.json").write_text(json.dumps(roster))
     return folder
 
@@ -88,8 +93,7 @@ def made_study(folder: Path) -> Path:
     over = taught(folder, ["left", "undo", *["right"] * 4])
     (folder / "second").mkdir()
     cut = taught(folder / "second", ["right", "quit"])
-    made = made_class(folder / "study", ["silver deer", "", "red owl"], 2)
-    (made / "protocol.toml").write_text(PROTOCOL)
+    made = made_class(folder / "study", ["silver deer", "", "red owl"], 2, PROTOCOL)
     for number, name, order, last in ((1, "silver deer", "ab", "=1+1"), (3, "red owl", "ba", "fine")):
         place = made / f"{number:02}-{name.replace(' ', '-')}"
         steps, at = [], 0

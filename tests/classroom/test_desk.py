@@ -4,11 +4,15 @@ import asyncio
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
+
+from lab.advice.entries import read_journal
 from lab.classroom.desk import Desk, processes
 from lab.classroom.desk_process import DeskOrder
 from lab.teaching.lesson_options import LessonOptions
-from tests.classroom.conftest import question
+from tests.classroom.conftest import answer, question, seated
 
+RIGHT = 3
 SECOND = """
 from lab import Gate
 
@@ -59,6 +63,29 @@ def test_a_gate_whose_file_nobody_named_is_not_run(tmp_path: Path, lesson: Lesso
     said = asyncio.run(fails())
     assert said.startswith("failed: gate 'own.Second'")
     assert "not run unasked" in said
+
+
+@pytest.mark.parametrize("turns", [0, 1, 20])
+def test_a_lesson_that_is_over_when_its_desk_is_closed_hands_out_its_document(
+    tmp_path: Path, lesson: LessonOptions, turns: int
+) -> None:
+    """The desk is closed while the last answer is on its way, or a little later; nothing in between is lost."""
+
+    async def closed() -> Desk:
+        desk, _ = await opened(DeskOrder(replace(lesson, episodes=1), tmp_path / "lesson", tmp_path / "toolbox"))
+        async with await desk.page() as page:
+            await answer(page, await seated(page), RIGHT)
+            await answer(page, await question(page), RIGHT)
+            for _ in range(turns):
+                await asyncio.sleep(0)
+            await desk.close()
+            for _ in range(100):  # what the pipe's thread has handed over
+                await asyncio.sleep(0)
+        return desk
+
+    desk = asyncio.run(closed())
+    is_over = read_journal(tmp_path / "lesson", "test").closed is not None
+    assert (desk.state, desk.result is not None) == (("over", True) if is_over else ("stopped", False))
 
 
 def test_a_desk_that_is_closed_before_it_opens_has_no_process(tmp_path: Path, lesson: LessonOptions) -> None:

@@ -18,7 +18,7 @@ PERSON = json.dumps(
         "participant": "silver deer",
         "number": 1,
         "order": [],
-        "consented": "",
+        "consented": "2026-11-28T19:00:00Z",
         "steps": [step("questionnaire", "tlx", 1, answers={"a": "x"})],
     }
 )
@@ -125,10 +125,10 @@ def test_parquet_holds_the_same_rows_with_types(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("file", "text", "said"),
     [
-        ("class.json", "{}", "class.json': format: "),
+        ("class.json", "{}", "class.json' (DIR): format: "),
         ("class.json", None, "holds no class"),
         ("01-silver-deer/participant.json", '{"format": "x"}', "participant.json': format: "),
-        ("01-silver-deer/participant.json", PERSON.replace("T19", "T99"), "participant.json': steps.0.began: "),
+        ("01-silver-deer/participant.json", PERSON.replace("T19:01", "T99:01"), "participant.json': steps.0.began: "),
         ("01-silver-deer/participant.json", PERSON.replace('"x"', "NaN"), "participant.json': steps.0.answers."),
         ("01-silver-deer/lesson-1/receipt.json", "{", "receipt.json': "),
         ("01-silver-deer/lesson-1/times.jsonl", "{}\n", "times.jsonl': line 1: "),
@@ -149,5 +149,5 @@ def test_a_damaged_folder_is_refused_with_its_file(tmp_path: Path, file: str, te
 
 
 def test_a_name_that_leads_elsewhere_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match=r"is called '../x': its file was edited"):
+    with pytest.raises(BadInput, match=r"pupil 1 is .*'../x'"):
         rows_of(made_class(tmp_path / "class", ["../x"], 1))

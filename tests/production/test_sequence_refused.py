@@ -26,9 +26,9 @@ KNOWN = ", ".join(sorted(SEQUENCERS))
         ("world-1", "world-1: it is a world, there is nothing to sequence: learn it with lab teach world-1"),
         (
             "ovn.toml",
-            "no task file 'ovn.toml': give a file that exists, .toml or .txt, or what ships; known: breakfast, fms-arm, fms, ",
+            "no task file 'ovn.toml': give a file that exists, .toml or .txt, or what ships; known: breakfast, class-hurry, ",
         ),
-        ("fsm", "unknown task 'fsm' (TASK): did you mean 'fms'? known: breakfast, fms, "),
+        ("fsm", "unknown task 'fsm' (TASK): did you mean 'fms'? known: breakfast, class-hurry, "),
         ("fms --case RSR --toasts 3", "--case RSR and --toasts 3: an order is one or the other"),
         ("oven.toml --case T --toasts 1", "--case T and --toasts 1: an order is one or the other"),
         (

@@ -183,7 +183,7 @@ def test_ctrl_c_while_a_grasp_is_tried_keeps_it_unsolved(
             {},
             "did you mean 'grasp at plate'. .* or one skill's full name, such as 'grasp at plate', or",
         ),
-        ("wrld-1", {}, "did you mean 'world-1'. .*, or a world: world-1"),
+        ("wrld-1", {}, "did you mean 'world-1'. .*, or a world: class-hurry, .*world-1"),
         ("insert", {"learner": "x"}, "unknown learner 'x' .--learner."),
         ("insert", {"gate": "x"}, "unknown gate 'x' .--gate."),
         ("insert", {"name": " "}, "policy name ' ' .--save.: wanted 1 to 100 printable characters"),

@@ -7,16 +7,20 @@ import socket
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack
-from typing import TYPE_CHECKING, Any
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, cast
 from urllib.request import urlopen
 
 import pytest
 from uvicorn import Server as Uvicorn
+from uvicorn.protocols.utils import ClientDisconnected
+from uvicorn.server import ServerState
 
 from lab.sim.frames import Body, Frame, Shape
 from lab.view import server_page
 from lab.view.meshcat import LiveView
 from lab.view.server import config_of, listening
+from lab.view.server_page import LimitedSocket
 
 if TYPE_CHECKING:
     Opens = Callable[..., AbstractContextManager[Any]]
@@ -172,3 +176,19 @@ def test_the_oldest_of_those_who_shake_no_hands_makes_room(monkeypatch: pytest.M
         assert [is_cut(one) for one in strangers[:2]] == [True, True]
         assert [*listener.knocking] == [one.getsockname() for one in strangers[2:]]
         assert [one.getpeername() for one in held[2:]] == [*listener.knocking]
+
+
+def test_nothing_is_written_to_a_connection_that_is_closing() -> None:
+    async def nobody(scope: Any, receive: Any, send: Any) -> None:
+        raise AssertionError
+
+    async def closing() -> None:
+        with listening(0) as listener:
+            config = config_of(nobody, listener)
+            config.load()
+            page = LimitedSocket(config=config, server_state=ServerState(), app_state={})
+            page.transport = cast(Any, SimpleNamespace(is_closing=lambda: True))  # which can write nothing
+            with pytest.raises(ClientDisconnected):
+                await page.send({"type": "websocket.send", "text": "x"})
+
+    asyncio.run(closing())

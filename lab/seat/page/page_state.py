@@ -32,6 +32,7 @@ from lab.seat.page.page_console import Console, measured_of, plan_of, run_of
 from lab.seat.page.page_question import place_of, question_of, slice_of, spot
 from lab.sequencing.cell.schedule import Move
 
+LESSON_OVER = "The lesson is over."  # what the page says then
 MOST = 400  # blocks of episodes that a page draws
 
 
