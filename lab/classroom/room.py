@@ -6,7 +6,7 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,10 @@ MOST_LOST = 3  # times that a killed process of one lesson is started again by i
 AT_ONCE = 2  # desks that are started at the same time
 
 
+async def unheard(message: Json) -> None:
+    """Does nothing: the page is not connected to its desk yet."""
+
+
 @dataclass(eq=False)
 class PupilPage:
     """An open page of a pupil: functions that send it text, close it, and give its desk a message as if it had sent it.
@@ -37,7 +41,7 @@ class PupilPage:
     number: int
     send: Callable[[str], Any]
     close: Callable[[int], Any]
-    say: Callable[[Json], Any] = field(default=lambda message: None)
+    say: Callable[[Json], Any] = unheard
     sees_free: bool = False
 
 

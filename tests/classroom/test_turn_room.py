@@ -167,8 +167,10 @@ def test_the_turn_of_a_pupil_who_has_gone_passes_on(server: ClassServer, monkeyp
 
     async def operate(second: Pupil) -> None:
         async with connect(frames(server, pages[0]), max_size=1 << 24, proxy=None) as opened:
+            first = Pupil(opened)
+            await first.sees(lambda at: at.told.get("turn"))
             await asyncio.to_thread(server.call, lambda: room(server).give_turn(1))
-            await Pupil(opened).operates()
+            await first.operates()
         await second.sees(lambda at: at.told["turn"] and at.told["turn"]["yours"])
         await second.operates()
 
