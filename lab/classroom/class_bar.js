@@ -1,10 +1,10 @@
-// What the class says on a pupil's page: lesson, hint, help, pause; in a study the step, the time that is left, and to go on.
+// What the class says on a pupil's page: lesson, hint, help, pause; whose turn it is; in a study the step, the time that is left, and to go on.
 "use strict";
 
 const classBar = (() => {
   const el = (id) => document.getElementById(id);
   const TICK_MS = 500;
-  let study = null, until = 0;
+  let study = null, until = 0, turnUntil = null, send = null;
 
   // The teacher's own key opens a pupil's desk, perhaps on a projector: it goes out of the address into this window's memory
   if (new URLSearchParams(location.search).has("pupil")) {
@@ -13,7 +13,7 @@ const classBar = (() => {
   }
   const search = location.search || sessionStorage.getItem("look") || "";
 
-  function show({ name, lesson, lessons, paused, hint, helped, team, fellows, late, study: now }) {
+  function show({ name, lesson, lessons, paused, hint, helped, team, fellows, late, turn, study: now }) {
     el("class").hidden = false;
     el("class-name").textContent = name;
     el("class-lesson").textContent = lessons > 1 ? `lesson ${lesson} of ${lessons}` : "";
@@ -23,7 +23,34 @@ const classBar = (() => {
     el("class-hint").textContent = hint ? `Hint: ${hint}` : "";
     el("class-helped").hidden = !helped;
     el("class-paused").hidden = !paused;
+    showTurn(turn || null);
     if (now) showStep(now);
+  }
+
+  // Of a run that is operated in turns: who operates, and when this pupil does
+  function showTurn(turn) {
+    el("class-turn").hidden = !turn;
+    el("class").classList.toggle("turns", Boolean(turn));
+    if (!turn) return;
+    if (turn.over) {
+      turnUntil = null;
+      el("class-operates").textContent = turn.over;
+      el("class-over").hidden = true;
+      el("class-turn").classList.remove("yours");
+      tickTurn();
+      return;
+    }
+    el("class-turn").classList.toggle("yours", turn.yours);
+    el("class-operates").textContent = turn.yours ? "Your turn: you operate." : `${turn.name} operates; ${turn.before ? `${turn.before} before you` : "you are next"}.`;
+    el("class-over").hidden = !(turn.yours && turn.next);
+    el("class-over").textContent = `Hand over to ${turn.next}`;
+    turnUntil = turn.left_s === null ? null : performance.now() + 1000 * turn.left_s;
+    tickTurn();
+  }
+
+  const clock = (left) => `${Math.floor(left / 60)}:${String(left % 60).padStart(2, "0")} left`;
+  function tickTurn() {
+    el("class-turn-left").textContent = turnUntil === null ? "" : clock(Math.max(0, Math.ceil((turnUntil - performance.now()) / 1000)));
   }
 
   function showStep(now) {
@@ -44,7 +71,7 @@ const classBar = (() => {
   function tick() {
     if (study === null) return;
     const left = until === null ? null : Math.max(0, Math.ceil((until - performance.now()) / 1000));
-    el("class-left").textContent = study.timed_out ? "Your time is up." : study.over ? "The lesson is over." : left === null ? "" : `${Math.floor(left / 60)}:${String(left % 60).padStart(2, "0")} left`;
+    el("class-left").textContent = study.timed_out ? "Your time is up." : study.over ? "The lesson is over." : left === null ? "" : clock(left);
   }
 
   async function goOn() {
@@ -57,6 +84,7 @@ const classBar = (() => {
   }
 
   el("class-go").onclick = goOn;
-  setInterval(tick, TICK_MS);
-  return { search, show };
+  el("class-over").onclick = () => send && send({ class: "hand over" });
+  setInterval(() => { tick(); tickTurn(); }, TICK_MS);
+  return { search, show, connected: (how) => { send = how; } };
 })();

@@ -1,5 +1,6 @@
-"""A lesson of a class: one of `lab teach`, or advice on an order, as `lab sequence` asks for it."""
+"""A lesson of a class: one of `lab teach`, advice on an order, as `lab sequence` asks for it, or a run of `lab operate`."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -7,16 +8,19 @@ from lab.errors import BadInput
 from lab.files import is_file
 from lab.gym import parse_name
 from lab.production.order_session import check_order_session
+from lab.production.run_options import RunOptions
+from lab.tasks.task_file import load
 from lab.teaching.kept_order import OrderSessionOptions
-from lab.teaching.lesson_options import LessonOptions
+from lab.teaching.lesson_options import DEFAULT_ADVISORS, LessonOptions
 from lab.teaching.subjects import subject_of
 from lab.toolbox.registry import Toolbox
 
 ADVISORS = ("web",)  # of every lesson of a class
 ADVISED = (ADVISORS, ("praise:web",))  # of a lesson of a study
 ORDER = "order:"  # begins the name of a lesson on an order; the rest is what lab sequence takes as TASK
+OPERATE = "operate:"  # begins the name of a run by hand; the rest is what lab operate takes as TASK
 METHOD = "srl"  # of a lesson on an order: the only method that asks
-ClassLesson = LessonOptions | OrderSessionOptions
+ClassLesson = LessonOptions | OrderSessionOptions | RunOptions
 
 
 def order_lesson_named(name: str, gate: str | None, episodes: int | None, seed: int) -> OrderSessionOptions:
@@ -31,19 +35,42 @@ def order_lesson_named(name: str, gate: str | None, episodes: int | None, seed: 
     return named.complete()
 
 
+def operation_named(name: str, seed: int) -> RunOptions:
+    """The run by hand that "operate:TASK" names. Raises BadInput for a name without a task."""
+    task = name.removeprefix(OPERATE)
+    if not task:
+        raise BadInput(f"lesson '{name}': a task is missing, such as {OPERATE}toast")
+    return RunOptions(task, advisors=DEFAULT_ADVISORS, seed=seed)
+
+
+def is_operation(lessons: Sequence[ClassLesson]) -> bool:
+    """Whether the lesson of a class is a run by hand. Raises BadInput for one that is not the only lesson."""
+    runs = [lesson for lesson in lessons if isinstance(lesson, RunOptions)]
+    if runs and len(lessons) > 1:
+        raise BadInput(
+            f"lesson '{name_of(runs[0])}' beside {len(lessons) - 1} other(s): all pupils operate one run in turns, "
+            "so it is a class's only lesson"
+        )
+    return bool(runs)
+
+
 def name_of(lesson: ClassLesson) -> str:
     """The name that `lab class` takes for a lesson."""
+    if isinstance(lesson, RunOptions):
+        return f"{OPERATE}{lesson.task}"
     return f"{ORDER}{lesson.task}" if isinstance(lesson, OrderSessionOptions) else lesson.subtask
 
 
 def named_by(lesson: ClassLesson) -> list[str]:
     """The world or sub-task, and the task, that a lesson names."""
-    about = lesson.task if isinstance(lesson, OrderSessionOptions) else lesson.subtask
+    about = lesson.subtask if isinstance(lesson, LessonOptions) else lesson.task
     return [name for name in dict.fromkeys([about, lesson.task]) if name]
 
 
 def title_of(lesson: ClassLesson) -> str:
-    """A lesson for people, such as "insert of toast", "world-1" or "order of toast-case-1"."""
+    """A lesson for people, such as "insert of toast", "world-1", "order of toast-case-1" or "toast by hand"."""
+    if isinstance(lesson, RunOptions):
+        return f"{_shown(lesson.task)} by hand"
     if isinstance(lesson, OrderSessionOptions):
         return f"order of {_shown(lesson.task)}"
     return f"{lesson.subtask} of {_shown(lesson.task)}" if lesson.task else _shown(lesson.subtask)
@@ -62,15 +89,25 @@ def module_of(lesson: ClassLesson) -> str:
 
 def check_lesson(lesson: ClassLesson) -> None:
     """Raises BadInput for a lesson that cannot be given, before anybody is asked. The code of its module is run."""
-    if isinstance(lesson, OrderSessionOptions):
+    if isinstance(lesson, RunOptions):
+        lesson.ordered(load(lesson.task))
+    elif isinstance(lesson, OrderSessionOptions):
         check_order_session(lesson, Toolbox())
     else:
         subject_of(lesson)
 
 
+def advisors_of(lesson: ClassLesson, of_study: bool = False) -> Sequence[tuple[str, ...]]:
+    """The advisors that a lesson of a class may have, one of these; of_study: whether the class is a study."""
+    if isinstance(lesson, RunOptions):
+        return (DEFAULT_ADVISORS,)  # who teaches the robot its skills; the pupils operate it
+    return ADVISED if of_study else (ADVISORS,)
+
+
 def lesson_to_json(lesson: ClassLesson) -> dict[str, Any]:
-    """The options of a lesson as a plain dict; only that of a lesson on an order says its kind."""
-    return {"kind": "order"} | lesson.to_json() if isinstance(lesson, OrderSessionOptions) else lesson.to_json()
+    """The options of a lesson as a plain dict; those that `lab teach` does not give say their kind."""
+    kind = "operate" if isinstance(lesson, RunOptions) else "order" if isinstance(lesson, OrderSessionOptions) else ""
+    return {"kind": kind} | lesson.to_json() if kind else lesson.to_json()
 
 
 def lesson_from_json(record: dict[str, Any], where: str) -> ClassLesson:
@@ -81,6 +118,10 @@ def lesson_from_json(record: dict[str, Any], where: str) -> ClassLesson:
             lesson: ClassLesson = LessonOptions.from_json(options, where)
         case "order":
             lesson = OrderSessionOptions.from_json(options, where).complete()
+        case "operate":
+            lesson = RunOptions.from_json(options, where)
         case other:
-            raise BadInput(f"{where}: a lesson is of the kind {other!r:.60}: allowed are 'lesson' and 'order'")
+            raise BadInput(
+                f"{where}: a lesson is of the kind {other!r:.60}: allowed are 'lesson', 'order' and 'operate'"
+            )
     return lesson

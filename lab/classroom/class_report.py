@@ -12,7 +12,8 @@ from lab.classroom.class_lesson import name_of
 from lab.classroom.class_record import LessonRecord, Number, TaughtLesson, class_record
 from lab.classroom.curve_chart import Chart, Curve, Kind, chart_of
 from lab.classroom.roster import Pupil, Roster
-from lab.classroom.tile import COLUMNS, HAND_OUTS, REPORT, TABLE
+from lab.classroom.tile import HAND_OUTS, REPORT, TABLE
+from lab.classroom.turn_record import columns_of, kept_rows
 from lab.errors import BadInput, counted
 from lab.files import csv_of, write_whole
 from lab.lazy import jinja2
@@ -227,10 +228,10 @@ def write_report(roster: Roster, rows: Sequence[Json] | None = None) -> Json:
     """
     records, pupils, title = class_record(roster), roster.learners, title_of_class(roster)
     if rows is None:
-        rows = [asdict(row) for record in records for row in record.finished]
+        rows = [asdict(row) for record in records for row in record.finished] + kept_rows(roster)
     handed = hand_outs(records, pupils)
     pages = {
-        TABLE: csv_of(rows, COLUMNS),
+        TABLE: csv_of(rows, columns_of(roster)),
         REPORT: report_page(title, records, len(roster.present)),
         HAND_OUTS: hand_out_page(title, handed),
     }

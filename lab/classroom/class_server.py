@@ -36,12 +36,14 @@ from lab.classroom.code_picture import code_svg
 from lab.classroom.desk import Desk, nothing_shown
 from lab.classroom.door import Door, Often
 from lab.classroom.room import OVER, RELOAD, REMOVED, PupilPage, Room
+from lab.classroom.rooms import room_of
 from lab.classroom.roster import Roster
 from lab.classroom.step_pages import StepPages
 from lab.classroom.study import Study
 from lab.classroom.study_room import StudyRoom
-from lab.classroom.team_room import TeamRoom
-from lab.classroom.tile import COLUMNS, HAND_OUTS, REPORT
+from lab.classroom.teacher_messages import obey
+from lab.classroom.tile import HAND_OUTS, REPORT
+from lab.classroom.turn_record import columns_of
 from lab.errors import BadInput, WorkFailed
 from lab.files import csv_of
 from lab.view.server import answer_of, config_of, listening
@@ -135,7 +137,7 @@ class ClassServer:
     async def _serve(self) -> None:
         self._loop, self._stopped = asyncio.get_running_loop(), asyncio.Event()
         self._loop.set_exception_handler(quiet_when_full)
-        self.room = self._made_room()
+        self.room = room_of(self.roster, self._study)
         self.room.on_news = self._stir
         config = config_of(self._application(), self._socket, **self._secured)
         config.load()
@@ -155,11 +157,6 @@ class ClassServer:
             connection.transport.abort()
         self._socket.close()
         await asyncio.sleep(0)
-
-    def _made_room(self) -> Room:
-        if self._study is not None:
-            return StudyRoom(self._study)
-        return TeamRoom(self.roster) if self.roster.teams else Room(self.roster)
 
     # ---- what is served
 
@@ -191,7 +188,7 @@ class ClassServer:
     async def _table(self, request: Request) -> Response:
         if not self._is_teacher(request):
             return PlainTextResponse("This page needs the token of the teacher's address.\n", 403)
-        return Response(csv_of(self.room.rows(), COLUMNS), media_type="text/csv")
+        return Response(csv_of(self.room.rows(), columns_of(self.roster)), media_type="text/csv")
 
     async def _report(self, request: Request) -> Response:
         """The report or the hand-outs of the class at this moment."""
@@ -277,7 +274,7 @@ class ClassServer:
 
             page.say = say
             down = asyncio.create_task(self._down(upstream, page, sits))
-            up = asyncio.create_task(self._up(browser, upstream, page, sits))
+            up = asyncio.create_task(self._up(browser, upstream, page))
             try:
                 await asyncio.wait([down, up], return_when=asyncio.FIRST_COMPLETED)
             finally:
@@ -306,13 +303,11 @@ class ClassServer:
                 if sits and FREE in message and self.room.takes_free_seat(page.number):
                     await page.say({"seat": "take"})
 
-    async def _up(self, browser: WebSocket, upstream: Any, page: PupilPage, sits: bool) -> None:
+    async def _up(self, browser: WebSocket, upstream: Any, page: PupilPage) -> None:
         with suppress(WebSocketDisconnect, ConnectionClosed):
             while True:
                 message = await text_of(browser)
-                if sits and (refusal := self.room.refusal(page.number)):
-                    await page.send(json.dumps({"refusal": refusal}))
-                else:
+                if await self.room.passes(page, message):
                     await upstream.send(message)
                 await asyncio.sleep(READ_S)
 
@@ -367,37 +362,21 @@ class ClassServer:
             "paused": self.room.paused,
             "most": self.roster.most,
             "study": None if self._study is None else self._study.told(),
+            "turns": self.room.turns(),
             "open": self._door.is_open,
             "tried": self._door.tried,
         }
 
     async def _do(self, message: str, browser: WebSocket) -> None:
         """Carry out what the teacher's page wants; a wrong message is answered with why."""
-        room = self.room
         try:
             match json.loads(message):
-                case {"do": "pause", "on": bool(paused)}:
-                    room.pause(paused)
-                case {"do": "hint", "pupil": int(number), "text": str(text)}:
-                    room.hint(number, text)
-                case {"do": "help", "pupil": int(number), "on": bool(begins)}:
-                    room.help(number, begins)
-                case {"do": "next", "pupil": int() | None as number}:
-                    room.go_on(number)
-                case {"do": "lesson", "pupil": int() | None as number, "lesson": int(lesson)}:
-                    room.go_on(number, lesson - 1)
-                case {"do": "begin"}:
-                    room.begin_lessons()
-                case {"do": "open", "pupil": int(number)}:
-                    room.open_again(number)
-                case {"do": "remove", "pupil": int(number)}:
-                    room.remove(number)
                 case {"do": "door", "open": bool(is_open)}:
                     self._door.is_open = is_open
                     self._stir()
                 case {"do": "end"}:
                     self.ended.set()
-                case _:
-                    raise BadInput("that was no message of this page")
+                case said:
+                    obey(self.room, said)
         except (BadInput, ValueError, RecursionError) as error:
             await sender(browser)(json.dumps({"refusal": str(error)}))

@@ -15,7 +15,7 @@ from typing import Any, Literal
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, WebSocketException
 
-from lab.classroom.desk_process import DeskOrder, sit
+from lab.classroom.desk_process import FINISH, DeskOrder, sit
 from lab.seat.page.page_state import PARTS, PageContent
 from lab.seat.page.teaching_page import TITLE
 
@@ -90,6 +90,12 @@ class Desk:
     def is_there(self) -> bool:
         """Whether the page of the process answers."""
         return bool(self._addresses)
+
+    def finish(self) -> None:
+        """Finish a run by hand: its document is made of what was done."""
+        if self._pipe is not None:
+            with suppress(OSError):
+                self._pipe.send(FINISH)
 
     async def close(self) -> None:
         """End the process: the lesson is interrupted, and its journal holds every answer. Safe to call again."""

@@ -18,12 +18,15 @@ from lab.advice.advisors import PAGE_OF
 from lab.advice.answer_times import AnswerTimes
 from lab.advice.entries import FILE, is_unbegun, read_journal
 from lab.classroom.class_lesson import ClassLesson
+from lab.classroom.operate_lesson import operated_lesson
 from lab.classroom.order_lesson import order_lesson
 from lab.errors import BadInput, LabError
 from lab.files import is_file
 from lab.learning.session_events import EpisodeEnded
 from lab.operating_system import own_session
 from lab.plugins.code_file import files_taken
+from lab.production.run_journal import RunEnded, is_run, read_run
+from lab.production.run_options import RunOptions
 from lab.seat.lesson_seat import LessonSeat
 from lab.seat.page.teaching_page import SeatPage
 from lab.seat.run_progress import RunProgress
@@ -39,6 +42,7 @@ from lab.teaching.teacher import Teacher
 from lab.toolbox.registry import Toolbox
 from lab.view.progress import EscapingConsole
 
+FINISH = "finish"  # what the class sends to finish a run by hand; anything else closes the desk
 RESUMED = "lab class --resume"  # where a journal is named, for errors
 LAST_S = 10.0  # time for a lesson to end after its pipe has closed
 DRAWN_S = 60.0  # time for the document and the pictures of one that is over
@@ -63,6 +67,18 @@ class DeskOrder:
     times: bool = False
 
 
+@dataclass(frozen=True)
+class _Signals:
+    """What the threads of a desk's process tell each other.
+
+    closed: the class closes the desk; finish: the run by hand is to be finished; taught: the last episode has ended.
+    """
+
+    closed: threading.Event = field(default_factory=threading.Event)
+    finish: threading.Event = field(default_factory=threading.Event)
+    taught: threading.Event = field(default_factory=threading.Event)
+
+
 def sit(order: DeskOrder, pipe: Connection) -> None:
     """Teach the lesson, or go on with it if its folder holds one; the main function of the process.
 
@@ -76,12 +92,12 @@ def sit(order: DeskOrder, pipe: Connection) -> None:
         with ExitStack() as stack:
             pages = {name: stack.enter_context(SeatPage()) for name in _people(order) or [""]}
             pipe.send(("pages", {name: (page.port, page.token) for name, page in pages.items()}))
-            closed, taught = threading.Event(), threading.Event()
-            threading.Thread(target=_until_closed, args=[pipe, closed, taught], daemon=True).start()
-            said = _taught(order, pages, taught)
+            signals = _Signals()
+            threading.Thread(target=_until_closed, args=[pipe, signals, order.folder], daemon=True).start()
+            said = _taught(order, pages, signals)
             with suppress(OSError):
                 pipe.send(said)
-            closed.wait()  # the pages go on showing how it ended, until the class closes the desk
+            signals.closed.wait()  # the pages go on showing how it ended, until the class closes the desk
     except KeyboardInterrupt:
         pass
     except LabError as error:
@@ -98,10 +114,10 @@ def _people(order: DeskOrder) -> list[str]:
     return [name.removeprefix(PAGE_OF) for name in options.advisor_names]
 
 
-def _taught(order: DeskOrder, pages: Mapping[str, SeatPage], taught: threading.Event) -> tuple[Any, ...]:
-    """What is sent through the pipe at the end; `taught` is set once the last episode has ended."""
+def _taught(order: DeskOrder, pages: Mapping[str, SeatPage], signals: _Signals) -> tuple[Any, ...]:
+    """What is sent through the pipe at the end."""
     try:
-        return "over", _lesson(order, pages, taught)
+        return "over", _lesson(order, pages, signals)
     except KeyboardInterrupt as stopped:  # Interrupted, too, which is one
         return "stopped", str(stopped)
     except LabError as error:
@@ -110,8 +126,8 @@ def _taught(order: DeskOrder, pages: Mapping[str, SeatPage], taught: threading.E
         return "failed", str(error)
 
 
-def _lesson(order: DeskOrder, pages: Mapping[str, SeatPage], taught: threading.Event) -> Mapping[str, Any]:
-    """The document of `lab teach --json`, or of `lab sequence --json` for a lesson on an order."""
+def _lesson(order: DeskOrder, pages: Mapping[str, SeatPage], signals: _Signals) -> Mapping[str, Any]:
+    """The document of `lab teach --json`, of `lab sequence --json` for a lesson on an order, or of `lab operate --json`."""
     take_again(order.files)
     with ExitStack() as stack:
         team = (
@@ -123,10 +139,12 @@ def _lesson(order: DeskOrder, pages: Mapping[str, SeatPage], taught: threading.E
         seat = LessonSeat(RunProgress(EscapingConsole(quiet=True)), None, pages.get(""), team=team, times=times)
         stack.callback(seat.clear_scene)
         toolbox = Toolbox(str(order.toolbox))
+        if isinstance(order.options, RunOptions):
+            return operated_lesson(order.options, order.folder, toolbox, seat, pages[""], signals.finish)
         if isinstance(order.options, OrderSessionOptions):
             return order_lesson(order.options, order.folder, toolbox, seat)
         options = order.options if team is None else replace(order.options, advisors=tuple(team.pages))
-        return _table_lesson(order, options, toolbox, seat, taught)
+        return _table_lesson(order, options, toolbox, seat, signals.taught)
 
 
 def _table_lesson(
@@ -158,22 +176,26 @@ def _table_lesson(
 
 
 def is_over(folder: Path) -> bool:
-    """Whether the session in a folder has ended."""
+    """Whether the session, or the run by hand, in a folder has ended."""
     with suppress(BadInput):
+        if is_run(folder):
+            _, entries, _ = read_run(folder, RESUMED)
+            return any(isinstance(entry, RunEnded) for entry in entries[-1:])
         journal = folder / FILE
         return is_file(journal) and not is_unbegun(journal) and read_journal(folder, RESUMED).closed is not None
     return False
 
 
-def _until_closed(pipe: Connection, closed: threading.Event, taught: threading.Event) -> None:
-    """Interrupt the lesson when the pipe closes, unless it has been taught and its document is about to come.
+def _until_closed(pipe: Connection, signals: _Signals, folder: Path) -> None:
+    """Interrupt the lesson in a folder when the pipe closes, unless it has been taught and its document is about to come.
 
     If it does not end within a few seconds, end the process.
     """
     with suppress(EOFError, OSError):
-        pipe.recv()
-    closed.set()
-    if taught.is_set():
+        while pipe.recv() == FINISH:
+            signals.finish.set()
+    signals.closed.set()
+    if signals.taught.is_set() or is_over(folder):
         threading.Event().wait(DRAWN_S)
     interrupt_main()
     threading.Event().wait(LAST_S)

@@ -6,7 +6,7 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,10 @@ MOST_LOST = 3  # times that a killed process of one lesson is started again by i
 AT_ONCE = 2  # desks that are started at the same time
 
 
+async def unheard(message: Json) -> None:
+    """Does nothing: the page is not connected to its desk yet."""
+
+
 @dataclass(eq=False)
 class PupilPage:
     """An open page of a pupil: functions that send it text, close it, and give its desk a message as if it had sent it.
@@ -37,7 +41,7 @@ class PupilPage:
     number: int
     send: Callable[[str], Any]
     close: Callable[[int], Any]
-    say: Callable[[Json], Any] = field(default=lambda message: None)
+    say: Callable[[Json], Any] = unheard
     sees_free: bool = False
 
 
@@ -203,6 +207,13 @@ class Room:
             return "Your teacher has paused the class."
         return "Your teacher answers for you now." if number in self._helped else ""
 
+    async def passes(self, page: PupilPage, message: str) -> bool:
+        """Whether a message of a page goes to the desk, as all of the teacher's do; the page is told why one does not."""
+        refusal = "" if page in self.shoulders else self.refusal(page.number)
+        if refusal:
+            await page.send(json.dumps({"refusal": refusal}))
+        return not refusal
+
     def _show(self, number: int) -> None:
         """Tell a pupil's page what the class says: lesson, pause, hint, help."""
         page, pupil = self.pages.get(number), self.roster.pupils[number - 1]
@@ -354,6 +365,10 @@ class Room:
     def teams(self) -> list[Json]:
         """What the teacher sees of each team; none in a class without teams."""
         return []
+
+    def turns(self) -> Json | None:
+        """What the teacher sees of a run that pupils operate in turns; None in any other class."""
+        return None
 
     def _document(self, learner: Pupil, lesson: int) -> Json | None:
         if lesson == learner.lesson:

@@ -16,17 +16,30 @@ import numpy as np
 from annotated_types import Ge, Le, MinLen
 from pydantic import StringConstraints, TypeAdapter, ValidationError
 
-from lab.classroom.class_lesson import ADVISED, ADVISORS, ClassLesson, lesson_from_json, lesson_to_json, name_of
+from lab.classroom.class_lesson import (
+    ClassLesson,
+    advisors_of,
+    is_operation,
+    lesson_from_json,
+    lesson_to_json,
+    name_of,
+)
 from lab.errors import BadInput
 from lab.files import is_file, read_limited, write_whole
 
 FILE = "class.json"
-LATER = ("study", "teams", "times")  # fields that older files lack, and that are written only where they say something
+LATER = (
+    "study",
+    "teams",
+    "times",
+    "turn_s",
+)  # fields that older files lack, and that are written only where they say something
 FORMAT: Final = "teaching-lab class 1"
 MOST_BYTES = 1 << 22
 MOST_PUPILS = 60
 MOST_TEAMS = 12
 MOST_PARTICIPANTS = 500  # of a study, who are not all there at once
+MOST_TURN_S = 3600.0  # of one turn at a run by hand
 MOST_JOINED = 900  # numbers of a class in all, with those of who was removed or has withdrawn
 NAME_LENGTH = 24
 LETTERS = "23456789abcdefghjkmnpqrstuvwxyz"  # without those that look alike
@@ -101,6 +114,7 @@ class _Kept:
     study: StudyEntry | None = None
     teams: Annotated[int, Ge(0), Le(MOST_TEAMS)] = 0
     times: bool = False
+    turn_s: Annotated[float, Ge(0.0), Le(MOST_TURN_S)] = 0.0
 
 
 class Full(Exception):
@@ -114,7 +128,7 @@ class Roster:
     code: what pupils type to join; port: of the last server, so that pupils' pages find the next one; typed_names: whether
     pupils choose their names; modules: those that the teacher has named for lessons such as gym:MODULE:ID, which is not kept;
     study: of a class that is a study; teams: in how many teams the pupils teach, 0 if each teaches alone; times: whether the
-    times of pupils' answers are kept beside their journals.
+    times of pupils' answers are kept beside their journals; turn_s: the length of a turn [s] at a run by hand, 0: no limit.
     """
 
     folder: Path
@@ -129,6 +143,7 @@ class Roster:
     study: StudyEntry | None = None
     teams: int = 0
     times: bool = False
+    turn_s: float = 0.0
 
     @classmethod
     def new(cls, folder: Path, lessons: Sequence[ClassLesson], seed: int, most: int, typed_names: bool) -> "Roster":
@@ -159,11 +174,13 @@ class Roster:
             raise BadInput(f"{where}: {at}: {why['msg']}: a file of lab class is wanted") from None
         lessons = tuple(lesson_from_json(options, where) for options in kept.lessons)
         for lesson in lessons:
-            allowed = (ADVISORS,) if kept.study is None else ADVISED
+            allowed = advisors_of(lesson, kept.study is not None)
             if lesson.advisor_names not in allowed:
                 raise BadInput(
-                    f"{where}: lesson '{name_of(lesson)}' has the advisors {lesson.advisor_names}: pupils advise: {ADVISORS}"
+                    f"{where}: lesson '{name_of(lesson)}' has the advisors {lesson.advisor_names}: allowed is {allowed[0]}"
                 )
+        if is_operation(lessons) and (kept.teams or kept.study is not None):
+            raise BadInput(f"{where}: a run by hand with teams, or in a study: a file of lab class is wanted")
         if kept.study is not None and len(kept.study.positions) != len(kept.pupils):
             raise BadInput(
                 f"{where}: {len(kept.study.positions)} positions, {len(kept.pupils)} pupils: a file of lab class is wanted"
@@ -179,7 +196,7 @@ class Roster:
             if not (is_named and (is_placed or pupil.is_gone)):
                 raise BadInput(f"{where}: pupil {number} is {asdict(pupil)}: a file of lab class is wanted")
         read = cls(folder, kept.code, lessons, kept.seed, kept.most, kept.typed_names, kept.port, kept.pupils)
-        read.study, read.teams, read.times = kept.study, kept.teams, kept.times
+        read.study, read.teams, read.times, read.turn_s = kept.study, kept.teams, kept.times, kept.turn_s
         return read
 
     def write(self) -> None:
@@ -188,7 +205,7 @@ class Roster:
         lessons = [lesson_to_json(lesson) for lesson in self.lessons]
         kept = _Kept(
             *(FORMAT, self.code, lessons, self.seed, self.most, self.typed_names, self.port, self.pupils),
-            *(self.study, self.teams, self.times),
+            *(self.study, self.teams, self.times, self.turn_s),
         )
         record = {name: value for name, value in asdict(kept).items() if name not in LATER or value}
         write_whole(self.folder / FILE, (json.dumps(record, indent=1) + "\n").encode())

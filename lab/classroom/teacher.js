@@ -4,7 +4,7 @@
 const el = (id) => document.getElementById(id), { make } = classTile;
 const boxes = new Map(), SURE_MS = 3000;
 let END = "End the class";
-let study = null; // its title, and what this page may do in it
+let study = null, turns = null; // its title, and what this page may do in it; of a run by hand its state and who operates
 let socket = null, paused = false, wall = false, isOpen = true, sure = 0;
 
 // Everybody sees the address on a projector: its key goes into this window's memory
@@ -26,6 +26,7 @@ const act = {
   next: (tile) => say({ do: "next", pupil: tile.number }),
   open: (tile) => say({ do: "open", pupil: tile.number }),
   remove: (tile) => say({ do: "remove", pupil: tile.number }),
+  turn: (tile) => say({ do: "turn", pupil: tile.number }),
 };
 
 function showClass(now) {
@@ -39,6 +40,8 @@ function showClass(now) {
     el("to-lesson").hidden = el("all").hidden = true;
     el("end").textContent = END = "End for now";
   }
+  turns = now.turns;
+  if (turns) showTurns();
   isOpen = now.open;
   el("door").textContent = isOpen ? "Close the door" : "Open the door";
   el("door").setAttribute("aria-pressed", String(!isOpen));
@@ -55,6 +58,14 @@ function showClass(now) {
   if (chosen) el("lesson").value = chosen;
 }
 
+// A run that the pupils operate in turns is the only lesson
+function showTurns() {
+  el("begin").hidden = turns.state !== "idle" || !boxes.size;
+  el("finish").hidden = turns.state !== "open";
+  el("to-lesson").hidden = el("all").hidden = true;
+  el("report").querySelector("h2").textContent = "What came of the run, and who gave how many commands";
+}
+
 function showTiles(tiles, gone) {
   removeTiles(gone);
   for (const tile of tiles) {
@@ -62,8 +73,9 @@ function showTiles(tiles, gone) {
       boxes.set(tile.number, classTile.create(act));
       el("tiles").append(boxes.get(tile.number).box);
     }
-    classTile.draw(boxes.get(tile.number), tile, study ? study.may : ["help", "hint", "next", "remove"]);
+    classTile.draw(boxes.get(tile.number), tile, study ? study.may : turns ? ["turn", "hint", "remove"] : ["help", "hint", "next", "remove"]);
   }
+  if (turns) showTurns();
   count();
 }
 
@@ -82,6 +94,7 @@ function count() {
 const HEADS = [
   ["lesson", "Lesson"], ["name", "Pupil"], ["solved", "Solved"], ["final_steps", "Steps at the end"], ["optimal_steps", "Fewest possible"],
   ["cost", "Best order"], ["optimal_cost", "Proven optimum"], ["episodes", "Episodes"],
+  ["delivered", "Delivered"], ["parts", "Ordered"], ["commands", "Commands"],
   ["answers", "Answers"], ["own_choice_too", "Its own choice, too"], ["not_best", "Not the best"], ["misleads", "Did not help"], ["believed", "Believed to the end"], ["tau", "Skill (tau)"],
 ];
 const shown = (value) => (value === null ? "" : value === true ? "yes" : value === false ? "no" : typeof value === "number" && !Number.isInteger(value) ? value.toFixed(2) : String(value));
@@ -93,11 +106,11 @@ function showRows(rows) {
     made.append(...cells.map((text) => make(kind, text)));
     return made;
   };
-  const heads = HEADS.filter(([name]) => rows.some((row) => row[name] !== null));
+  const heads = HEADS.filter(([name]) => rows.some((row) => (row[name] ?? null) !== null));
   el("report").querySelector("thead").replaceChildren(line(heads.map(([, head]) => head), "th"));
   el("report").querySelector("tbody").replaceChildren(...rows.map((row, k) => {
-    const made = line(heads.map(([name]) => shown(row[name])), "td");
-    if (row.solved && (k === 0 || rows[k - 1].lesson !== row.lesson)) made.className = "first";
+    const made = line(heads.map(([name]) => shown(row[name] ?? null)), "td");
+    if (row.solved && row.commands === undefined && (k === 0 || rows[k - 1].lesson !== row.lesson)) made.className = "first";
     return made;
   }));
 }
@@ -125,6 +138,7 @@ function follow(pause = 300) {
 }
 
 el("begin").onclick = () => say({ do: "begin" });
+el("finish").onclick = () => say({ do: "finish" });
 el("pause").onclick = () => say({ do: "pause", on: !paused });
 el("all").onclick = () => say({ do: "lesson", pupil: null, lesson: Number(el("lesson").value) });
 el("board").onclick = () => {

@@ -77,8 +77,8 @@ const classTeams = (() => {
 
   function show(teams) {
     el("teams").hidden = !teams.length;
-    el("begin").hidden = !teams.some((team) => team.state === "idle");
     if (!teams.length) return;
+    el("begin").hidden = !teams.some((team) => team.state === "idle");
     el("ahead").textContent = new Set(teams.map((team) => team.lesson)).size === 1 ? ahead(teams) : "";
     el("race").replaceChildren(race(teams));
     el("cards").replaceChildren(...teams.map(card));

@@ -52,6 +52,7 @@ const classTile = (() => {
 
   function status(tile) {
     if (tile.state === "idle") return [tile.study ? tile.study.doing : "", tile.study && tile.study.doing === "finished" ? "over" : ""];
+    if (tile.commands !== undefined && ["open", "over"].includes(tile.state)) return tile.state === "over" ? ["the run is over", "over"] : [tile.turn ? "operates" : "watches", tile.turn ? "asks" : ""];
     if (tile.state === "over") return [`${STATES.over}: ${ending(tile)}`, tile.state];
     if (tile.state !== "open") return [`${STATES[tile.state]}${tile.text ? `: ${tile.text}` : ""}`, tile.state];
     if (!tile.here && tile.asks) return ["asks, and nobody is there", "away"];
@@ -81,6 +82,7 @@ const classTile = (() => {
       field.focus();
     });
     const look = button("Look", "over the shoulder, live; while you help you answer there", () => act.look(parts.tile));
+    parts.turn = button("Your turn", "let this pupil operate now", () => act.turn(parts.tile));
     let sure = 0;
     const remove = button("Remove", "take this seat away, for good", () => {
       if (performance.now() < sure) act.remove(parts.tile);
@@ -90,7 +92,7 @@ const classTile = (() => {
     });
     head.append(name, here);
     Object.assign(parts, { hints: ask, next: button("Next", "to the next lesson", () => act.next(parts.tile)), remove });
-    row.append(look, parts.help, ask, parts.next, remove, parts.open);
+    row.append(look, parts.turn, parts.help, ask, parts.next, remove, parts.open);
     box.append(head, parts.picture, says, facts, hint, row, form);
     return parts;
   }
@@ -108,6 +110,9 @@ const classTile = (() => {
     const answers = `${tile.taken} answered${tile.skipped ? `, ${tile.skipped} left to it` : ""}${tile.misleads ? `, ${tile.misleads} did not help` : ""}`;
     parts.facts.textContent = `${tile.title || "no lesson yet"}: episode ${tile.episode}${tile.episodes ? ` of ${tile.episodes}` : ""}; ${answers}${best(tile)}`;
     if (tile.study) parts.facts.textContent = `Step ${tile.study.step} of ${tile.study.steps}${tile.study.arm ? `, arm ${tile.study.arm}` : ""} (${tile.study.order.join(", ")})${tile.state === "idle" ? "" : `; ${parts.facts.textContent}`}`;
+    if (tile.commands !== undefined) parts.facts.textContent = `${tile.commands} ${tile.commands === 1 ? "command" : "commands"}`;
+    parts.picture.classList.toggle("none", tile.commands !== undefined);
+    parts.turn.hidden = !may.includes("turn") || tile.turn || tile.state !== "open";
     parts.help.hidden = !may.includes("help");
     parts.hints.hidden = !may.includes("hint");
     parts.next.hidden = !may.includes("next");

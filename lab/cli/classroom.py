@@ -20,7 +20,8 @@ def hold_class(
         list[str] | None,
         typer.Argument(
             help="The lessons, in their order: whatever lab teach takes as SUBTASK: {skills}, a world, gym:ID, "
-            "./mine.py:Problem, {problems}; or order:TASK, advice on an order, as lab sequence TASK asks for it.",
+            "./mine.py:Problem, {problems}; or order:TASK, advice on an order, as lab sequence TASK asks for it; or, "
+            "alone, operate:TASK, one run by hand in turns, as lab operate TASK.",
             metavar="LESSON...",
             autocompletion=offers("skills", "problems"),
             callback=from_files("problems"),
@@ -57,6 +58,16 @@ def hold_class(
             help="The pupils teach in so many teams, each with one learner that judges whom of them to believe; 0: each alone.",
         ),
     ] = 0,
+    turn: Annotated[
+        float,
+        typer.Option(
+            "--turn",
+            metavar="SECONDS",
+            min=0.0,
+            max=3600.0,
+            help="Length of a turn at operate:TASK; 0: until it is handed over.",
+        ),
+    ] = 0.0,
     typed_names: Annotated[
         bool, typer.Option("--typed-names", help="Pupils type their names; by default each is given a pseudonym.")
     ] = False,
@@ -109,6 +120,7 @@ def hold_class(
             )
         roster = deferred.Roster.read(resume)
         roster.modules = tuple(trust_module or ())
+        roster.turn_s = _checked_turn(turn, roster) or roster.turn_s
         held = None if roster.study is None else deferred.StudyWithPeople.read(roster)
     elif study is not None:
         given = {
@@ -121,12 +133,13 @@ def hold_class(
             "--seed": seed,
             "--pupils": pupils != SEATS,
             "--teams": teams,
+            "--turn": turn,
         }
         held = _study(study, out, tuple(trust_module or ()), [name for name, value in given.items() if value])
         roster = held.roster
     else:
         roster = _new(lessons or [], out, pupils, typed_names, seed, (task, learner, gate, episodes))
-        roster.teams = _checked_teams(teams, roster)
+        roster.teams, roster.turn_s = _checked_teams(teams, roster), _checked_turn(turn, roster)
         roster.modules = tuple(filter(None, map(deferred.module_of, roster.lessons)))
     roster.times = roster.times or times
     _check(roster)
@@ -157,6 +170,12 @@ def _new(
         raise BadInput(f"--learner {learner}: lessons on an order are learned by srl, and there is no other: remove it")
     wanted: list[deferred.ClassLesson] = []
     for lesson in lessons:
+        if lesson.startswith(deferred.OPERATE_LESSON):
+            given = {"--task": task, "--learner": learner, "--gate": gate, "--episodes": episodes}
+            if named := [option for option, value in given.items() if value is not None]:
+                raise BadInput(f"{named[0]} with the lesson '{lesson}': a run by hand has no such option: remove it")
+            wanted.append(deferred.operation_named(lesson, seed))
+            continue
         if lesson.startswith(deferred.ORDER_LESSON):
             wanted.append(deferred.order_lesson_named(lesson, gate, episodes, seed))
             continue
@@ -165,6 +184,7 @@ def _new(
             lesson, task if is_skill else None, None, learner, gate, None, deferred.PUPILS, episodes=episodes, seed=seed
         )
         wanted.append(of)
+    deferred.is_operation(wanted)
     return deferred.Roster.new(out, wanted, seed, pupils, typed_names)
 
 
@@ -184,13 +204,23 @@ def _study(file: Path, out: Path | None, modules: tuple[str, ...], beside: list[
 
 
 def _checked_teams(teams: int, roster: "deferred.Roster") -> int:
-    """The number of teams. Raises BadInput for teams in a class that has a lesson on an order."""
+    """The number of teams. Raises BadInput for teams in a class that has a lesson on an order, or a run by hand."""
+    if teams and deferred.is_operation(roster.lessons):
+        name = deferred.name_of(roster.lessons[0])
+        raise BadInput(f"--teams {teams} with the lesson '{name}': all pupils operate one run in turns")
     for lesson in roster.lessons if teams else ():
         if lesson.command == "sequence":
             raise BadInput(
                 f"--teams {teams} with the lesson '{deferred.name_of(lesson)}': teams advise one table, no order"
             )
     return teams
+
+
+def _checked_turn(turn: float, roster: "deferred.Roster") -> float:
+    """The length of a turn [s]. Raises BadInput for turns in a class without a run by hand."""
+    if turn and not deferred.is_operation(roster.lessons):
+        raise BadInput(f"--turn {turn:g}: only a run by hand has turns, such as lab class operate:toast")
+    return turn
 
 
 def _check(roster: "deferred.Roster") -> None:

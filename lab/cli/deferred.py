@@ -13,8 +13,17 @@ if TYPE_CHECKING:
     from lab.api.scenes import seen
     from lab.audit.audit import audit, kept_evidence
     from lab.classroom.class_lesson import ADVISORS as PUPILS
+    from lab.classroom.class_lesson import OPERATE as OPERATE_LESSON
     from lab.classroom.class_lesson import ORDER as ORDER_LESSON
-    from lab.classroom.class_lesson import ClassLesson, check_lesson, module_of, name_of, order_lesson_named
+    from lab.classroom.class_lesson import (
+        ClassLesson,
+        check_lesson,
+        is_operation,
+        module_of,
+        name_of,
+        operation_named,
+        order_lesson_named,
+    )
     from lab.classroom.class_report import write_report
     from lab.classroom.class_server import ClassServer
     from lab.classroom.code_picture import code_text
@@ -41,14 +50,12 @@ if TYPE_CHECKING:
     from lab.production.evaluation import evaluate, skill_of, task_of
     from lab.production.operation.commands import Done, pace
     from lab.production.operation.desk import Desk, RunDesk
-    from lab.production.operation.operation import Operation
+    from lab.production.operation.operated_run import kept_operation, operating_desk
     from lab.production.order_session import sequenced
     from lab.production.publication import CARD, publish, write_card
-    from lab.production.report import write_files
-    from lab.production.run import remember
     from lab.production.run import run as run_task
     from lab.production.run_advice import RunAdvice
-    from lab.production.run_journal import RunEnded, RunJournal, is_run, replayed_run
+    from lab.production.run_journal import RunJournal, is_run, replayed_run
     from lab.production.run_options import RunOptions, begun, kept_task
     from lab.production.run_options import gone_on as run_gone_on
     from lab.seat.language_model import language_models
@@ -159,8 +166,11 @@ TABLE = {
         "ADVISORS as PUPILS",
         "check_lesson",
         "ClassLesson",
+        "is_operation",
         "module_of",
         "name_of",
+        "OPERATE as OPERATE_LESSON",
+        "operation_named",
         "ORDER as ORDER_LESSON",
         "order_lesson_named",
     ),
@@ -190,13 +200,12 @@ TABLE = {
     "lab.production.evaluation": ("evaluate", "skill_of", "task_of"),
     "lab.production.operation.commands": ("Done", "pace"),
     "lab.production.operation.desk": ("Desk", "RunDesk"),
-    "lab.production.operation.operation": ("Operation",),
+    "lab.production.operation.operated_run": ("kept_operation", "operating_desk"),
     "lab.production.order_session": ("sequenced",),
     "lab.production.publication": ("CARD", "publish", "write_card"),
-    "lab.production.report": ("write_files",),
-    "lab.production.run": ("remember", "run as run_task"),
+    "lab.production.run": ("run as run_task",),
     "lab.production.run_advice": ("RunAdvice",),
-    "lab.production.run_journal": ("is_run", "replayed_run", "RunEnded", "RunJournal"),
+    "lab.production.run_journal": ("is_run", "replayed_run", "RunJournal"),
     "lab.production.run_options": ("begun", "kept_task", "gone_on as run_gone_on", "RunOptions"),
     "lab.seat.language_model": ("language_models",),
     "lab.seat.lesson_seat": ("LessonSeat",),

@@ -1,7 +1,7 @@
 """`lab operate`: the operator's console."""
 
 import sys
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -51,7 +51,8 @@ def operate(
         loaded = deferred.load(options.task)
     else:
         options, loaded = deferred.run_gone_on(options, resume, out, "operate")
-    order, folder = loaded.ordered(options.toasts, options.parts), resume or out or Path(f"{loaded.name}-run")
+    loaded.ordered(options.toasts, options.parts)  # impossible parts are refused before a journal is written
+    folder = resume or out or Path(f"{loaded.name}-run")
     deferred.check_out(folder)
     journal = (
         deferred.begun(options, loaded, folder, "operate") if resume is None else deferred.RunJournal.resume(folder)
@@ -61,11 +62,10 @@ def operate(
             if live:
                 seat.progress.hear = deferred.unheard  # type: ignore[method-assign]  # the panel tells
             teacher = teacher_of(toolbox, options.lessons(), seat)
-            conditions = deferred.Conditions(
-                1.0, seat.page, deferred.Controls(speed_now), journal, fault_seed=options.faults
+            desk = deferred.operating_desk(
+                options, loaded, teacher, journal, seat.page, speed=speed_now, attended=watched
             )
-            operation = deferred.Operation(loaded, order, options.seed, teacher, conditions)
-            desk = deferred.Desk(operation, attended=watched, known=journal.known)
+            operation = desk.operation
             if seat.page is not None:
                 shown = seat.page
                 operation.on_done.append(lambda done: shown.ran())
@@ -73,7 +73,7 @@ def operate(
             try:
                 bad = _at_console(desk, live, as_json, stay=page)
             finally:
-                document = _kept(operation, folder)
+                document = deferred.kept_operation(operation, folder)
                 operation.close()
     finally:
         journal.close()
@@ -89,29 +89,6 @@ def _at_console(desk: "deferred.Desk", live: bool, as_json: bool, stay: bool) ->
         return None
     console = deferred.PlainConsole(desk, complain if as_json else lambda line: write(f"{line}\n"))
     return console.run(sys.stdin, stay=stay)
-
-
-def _kept(operation: "deferred.Operation", folder: Path) -> dict[str, Any]:
-    """The document of what was done, after writing the files of the run, if there was one."""
-    scene, report = operation.scene, operation.report()
-    document = {
-        "task": scene.task.name,
-        "seed": scene.seed,
-        "parts": {kind: scene.order.count(kind) for kind in dict.fromkeys(scene.order)},
-        "success": False,
-        "delivered": 0,
-        "failure": None,
-        "files": {},
-    }
-    if report is not None and report.outcome.schedule.robot:
-        deferred.write_files(report, folder)
-        if not report.outcome.interrupted:
-            deferred.remember(report, scene.teacher)
-            scene.journal.tell(deferred.RunEnded(len(report.outcome.delivered), report.outcome.failure or ""))
-    if report is not None:
-        document |= report.to_json()
-    said = {"commands": [asdict(done) for done in operation.done], "demonstrations": scene.demonstrations}
-    return document | said | {"status": operation.now().to_json()}
 
 
 def _summary(document: dict[str, Any]) -> Any:

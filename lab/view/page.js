@@ -199,7 +199,9 @@ function follow(pause = 300) {
     ? new WebSocket(new URL(`frames${search}`, location.href.replace(/^http/, "ws"))) : new PolledSocket();
   socket.onopen = () => {
     pause = 300;
-    if (panel) panel.connected((message) => socket.send(JSON.stringify(message)));
+    const send = (message) => socket.send(JSON.stringify(message));
+    if (panel) panel.connected(send);
+    if (typeof classBar !== "undefined") classBar.connected(send);
   };
   socket.onmessage = (event) => {
     const { scene, frame, seat: parts, refusal, class: told } = JSON.parse(event.data);

@@ -66,6 +66,7 @@ def _document(lesson: ClassLesson, folder: Path, box: Toolbox, ask: Ask) -> dict
     if isinstance(lesson, OrderSessionOptions):
         kept = OrderSession(lesson, box, out=folder)
         return sequenced(kept, {"web": ask}, Teacher(box, Advising.of(("expert",)))) | kept.worth()
+    assert isinstance(lesson, LessonOptions)
     return teach(subject_of(lesson), lesson, Teacher(box, lesson.advising({"web": ask})), folder)
 
 

@@ -33,7 +33,7 @@ def test_the_lessons_are_those_of_the_arms_with_their_options(tmp_path: Path) ->
     assert [name_of(lesson) for lesson in lessons] == [str(tmp_path / "small.txt")] * 3
     assert [lesson.advisor_names for lesson in lessons] == [("web",), ("praise:web",), ("web",)]
     assert [lesson.seed for lesson in lessons] == [7, 3, 7]
-    assert [lesson.episodes for lesson in lessons] == [2, 2, 2]
+    assert [lesson.to_json()["episodes"] for lesson in lessons] == [2, 2, 2]
 
 
 def test_the_example_is_a_study_of_three_arms(tmp_path: Path) -> None:

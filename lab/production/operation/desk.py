@@ -29,9 +29,16 @@ class Desk:
     busy: the current command, or "". The operation's `on_done` is called with the results of commands.
     """
 
-    def __init__(self, operation: Operation, *, attended: bool = True, known: Sequence[Entry] = ()) -> None:
-        """known: the entries of a journal, which are repeated first."""
-        self.operation, self._known = operation, known
+    def __init__(
+        self,
+        operation: Operation,
+        *,
+        attended: bool = True,
+        known: Sequence[Entry] = (),
+        words: Sequence[str] = tuple(COMMANDS),
+    ) -> None:
+        """known: the entries of a journal, which are repeated first. words: of the commands that pages offer."""
+        self.operation, self._known, self.words = operation, known, words
         self.busy, self.closed = "lays the scene out", False
         self._changed = Condition()
         operation.controls.attended = attended
@@ -40,11 +47,6 @@ class Desk:
     def controls(self) -> Controls:
         """The stops and the pace of the run."""
         return self.operation.controls
-
-    @property
-    def words(self) -> tuple[str, ...]:
-        """The words of the commands that the desk accepts."""
-        return tuple(COMMANDS)
 
     @property
     def names(self) -> Mapping[str, Sequence[str]]:
