@@ -100,7 +100,9 @@ def test_a_random_world_is_written_checked_and_learned(lab: Lab, folder: Path, t
     assert lab("task", "check", "w.toml").out == "w.toml is sound\n"
     ran = lab("teach", "w.toml", "--out", "pictures", "--json")
     assert (ran.code, ran.json["solved"]) == (0, True)
-    assert tree(folder / "pictures") == ["events.jsonl", "learning-curve.png", "receipt.json", "value-map.png"]
+    kept = ["inputs", "inputs/subtask", "inputs/subtask/w.toml", "versions.json"]
+    pictures = ["learning-curve.png", "value-map.png"]
+    assert tree(folder / "pictures") == sorted(["events.jsonl", "receipt.json", *kept, *pictures])
 
 
 def test_a_world_without_a_way_is_not_sound(lab: Lab, folder: Path) -> None:
