@@ -73,7 +73,7 @@ def attend(server: ClassServer, tell: Callable[[str], None]) -> None:
 def closing(server: ClassServer) -> Json:
     """The document of the class so far; its table, report and hand-outs are written into its folder. Raises BadInput."""
     document = write_report(server.roster, server.call(server.room.rows))
-    tiles = server.call(server.room.tiles)
+    tiles = server.call(server.room.standing)
     for pupil in document["pupils"]:
         pupil |= {name: tiles[pupil["number"]][name] for name in ("lesson", "state", "text")}
     return document

@@ -362,6 +362,10 @@ class Room:
             rows += best_first([row_of(learner, lesson, document) for learner, document in finished if document])
         return rows
 
+    def standing(self) -> dict[int, Json]:
+        """Lesson, state and text of each of the roster's `learners`, by number."""
+        return self.tiles()
+
     def teams(self) -> list[Json]:
         """What the teacher sees of each team; none in a class without teams."""
         return []

@@ -159,6 +159,10 @@ class TeamRoom(Room):
         """Of each team: its lesson, curve and result, and how far its learner trusts each pupil."""
         return [self._team(learner) for learner in self.roster.learners]
 
+    def standing(self) -> dict[int, Json]:
+        """Lesson, state and text of each team, by number."""
+        return {team["team"]: team | {"text": self._teams[team["team"]].text} for team in self.teams()}
+
     def _team(self, learner: Pupil) -> Json:
         desk = self._teams[learner.number]
         lesson, curve = desk.parts.get("lesson") or {}, desk.parts.get("curve") or {}

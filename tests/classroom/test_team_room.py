@@ -12,6 +12,7 @@ from websockets.asyncio.client import connect
 from lab.advice.entries import FILE, read_journal
 from lab.classroom.class_place import Place
 from lab.classroom.class_server import ClassServer
+from lab.classroom.holding import closing
 from lab.classroom.roster import Roster
 from lab.errors import BadInput
 from lab.teaching.kept_session import KeptSession
@@ -143,6 +144,16 @@ def test_a_killed_server_leads_back_to_the_teams_open_question(server: ClassServ
     with ClassServer(Roster.read(roster.folder), Place()) as again:
         asyncio.run(one_answer(again))
     assert folder.joinpath(FILE).read_bytes().startswith(before)
+
+
+def test_the_class_ends_with_a_page_for_each_team_also_after_a_pupil_was_removed(server: ClassServer) -> None:
+    for _ in range(4):
+        join(server)
+    server.call(lambda: server.room.remove(1))
+    server.call(lambda: server.room.remove(2))
+    document = closing(server)
+    known = [(team["name"], team["state"], Path(team["hand_out"]).parent.name) for team in document["pupils"]]
+    assert known == [("team 1", "idle", "01-team-1"), ("team 2", "idle", "02-team-2")]
 
 
 def test_lessons_begin_once(server: ClassServer) -> None:
