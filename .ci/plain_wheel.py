@@ -27,7 +27,18 @@ if __name__ == "__main__":
         sys.exit(subprocess.run([sys.executable, *sys.argv[1:], "--dask", cluster.scheduler_address]).returncode)
 """
 
-CLASS = json.dumps({"format": "teaching-lab class 1", "lessons": [], "pupils": [{"number": 1, "name": "red owl"}]})
+CLASS = json.dumps(
+    {
+        "format": "teaching-lab class 1",
+        "code": "abcdef",
+        "lessons": [{"subtask": "world-1", "advisors": ["web"]}],
+        "seed": 0,
+        "most": 30,
+        "typed_names": False,
+        "port": 0,
+        "pupils": [{"number": 1, "name": "red owl", "key_hash": ""}],
+    }
+)
 
 
 class Place:
