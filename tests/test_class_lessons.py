@@ -25,6 +25,8 @@ from lab.mdp import TabularMDP
 from lab.tasks.task_file import load_world
 from tests.classroom.conftest import WITHIN_S, until
 
+pytestmark = pytest.mark.slow
+
 Json = dict[str, Any]
 ROOT = Path(__file__).resolve().parent.parent
 LESSONS = ROOT / "docs" / "class-lessons"
