@@ -56,7 +56,7 @@ ALONE: dict[str, set[str]] = (
         "websockets": {"lab.classroom.class_server", "lab.classroom.desk"},
         "segno": {"lab.classroom.code_picture"},
         "cryptography": {"lab.classroom.certificate"},
-        "jinja2": {"lab.studies.report", "lab.studies.people_report", "lab.classroom.class_report"},
+        "jinja2": {"lab.view.printed_page"},
         "pyarrow": {"lab.classroom.export"},
         "statsmodels": {"lab.studies.people"},
         "lark": {"lab.words.slots"},
@@ -90,11 +90,8 @@ HEAVY = (
 READS_ITS_OWN = (  # what ships with the lab, or what it has just written: nothing that a stranger may have made
     *(
         "lab.classroom.class_place",
-        "lab.classroom.class_report",
         "lab.view.meshcat",
         "lab.view.server_page",
-        "lab.studies.report",
-        "lab.studies.people_report",
         "lab.cli.export",
         "lab.toolbox.remote_place",
     ),

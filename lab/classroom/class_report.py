@@ -3,7 +3,6 @@
 from base64 import b64encode
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +15,11 @@ from lab.classroom.tile import HAND_OUTS, REPORT, TABLE
 from lab.classroom.turn_record import columns_of, kept_rows
 from lab.errors import BadInput, counted
 from lab.files import csv_of, write_whole
-from lab.lazy import jinja2
 from lab.version import __version__
+from lab.view.printed_page import printed_page
 
 HERE = Path(__file__).parent
 HAND_OUT = "hand-out.html"
-POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"  # of all pages
 PNG = b"\x89PNG\r\n\x1a\n"
 LEGEND = {  # of the lines of a report's picture
     "believed": "believed to the end",
@@ -176,26 +174,13 @@ def hand_out_page(title: str, handed: Sequence[HandOut]) -> str:
     return _rendered("hand_out.html", title=title, handed=handed)
 
 
-@cache
-def _templates() -> "jinja2.Environment":
-    return jinja2.Environment(
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-        loader=jinja2.FileSystemLoader(HERE),
-    )
-
-
 def _rendered(template: str, **known: Any) -> str:
     words = (
         *(how_it_ended, what_was_believed, better_episodes, before_and_after),
         *(best_answers, receipt_lines, number, cost, counted),
     )
     functions = {function.__name__: function for function in words}
-    css = (HERE / "class_report.css").read_text(encoding="utf-8")
-    page = _templates().get_template(template)
-    return page.render(**known, **functions, version=__version__, policy=POLICY, legend=LEGEND, css=css)
+    return printed_page(HERE / template, **known, **functions, version=__version__, legend=LEGEND)
 
 
 def _data_url(picture: bytes | None) -> str:

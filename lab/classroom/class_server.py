@@ -31,7 +31,7 @@ from lab.classroom.browser_socket import closer, sender, text_of
 from lab.classroom.certificate import fingerprint, made_certificate
 from lab.classroom.class_lesson import title_of
 from lab.classroom.class_place import Place, files_of
-from lab.classroom.class_report import POLICY, page_now
+from lab.classroom.class_report import page_now
 from lab.classroom.code_picture import code_svg
 from lab.classroom.desk import Desk, nothing_shown
 from lab.classroom.door import Door, Often
@@ -46,6 +46,7 @@ from lab.classroom.tile import HAND_OUTS, REPORT
 from lab.classroom.turn_record import columns_of
 from lab.errors import BadInput, WorkFailed
 from lab.files import csv_of
+from lab.view.printed_page import POLICY
 from lab.view.server import answer_of, config_of, listening
 from lab.view.server_page import quiet_when_full
 

@@ -11,10 +11,11 @@ import numpy as np
 
 from lab.errors import BadInput
 from lab.files import check_out, write_whole
-from lab.lazy import jinja2, matplotlib
+from lab.lazy import matplotlib
 from lab.studies.people import MeasureCompared, Row, compare_arms
 from lab.version import __version__
 from lab.view.canvas import BLUE, GREY, INK, picture_bytes
+from lab.view.printed_page import printed_page
 
 TEMPLATE = Path(__file__).with_name("people.html")
 MOST_NAME = 80  # characters of a figure's file
@@ -47,8 +48,8 @@ def people_compared(
     )
     if about.get("withdrawn"):
         head += f" Withdrawn, and in no number here: {about['withdrawn']}."
-    page = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined)
-    text = page.from_string(TEMPLATE.read_text(encoding="utf-8")).render(
+    text = printed_page(
+        TEMPLATE,
         title=f"The arms of the study {about['class']}",
         head=head,
         notes=notes,

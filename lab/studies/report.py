@@ -12,10 +12,10 @@ from typing import Any
 
 from lab import files
 from lab.errors import BadInput, WorkFailed
-from lab.lazy import jinja2
 from lab.statistics import PERCENT_POINTS, RELATIVE, allowed
 from lab.studies.findings import JUDGED, Findings, counts, share_within
 from lab.version import __version__
+from lab.view.printed_page import printed_page
 
 Row = Mapping[str, Any]  # settings under their names, and RESULTS; `lab_version` where another version measured it
 Line = tuple[tuple[str, Any], ...]  # some settings of a row
@@ -72,8 +72,8 @@ def write_report(path: Path, title: str, name: str, found: Findings) -> None:
 
     Raises BadInput for a figure that is neither SVG nor PNG, WorkFailed if the file cannot be written.
     """
-    page = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined)
-    text = page.from_string(TEMPLATE.read_text(encoding="utf-8")).render(
+    text = printed_page(
+        TEMPLATE,
         title=title,
         name=name,
         count=len(found.rows),
