@@ -22,6 +22,7 @@ from lab.files import is_file, read_limited
 from lab.learning.session_events import AdviceRejected, EpisodeEnded
 from lab.sequencing.cell.objectives import MAKESPAN
 from lab.statistics import proportion_interval
+from lab.tasks.record import first_fault
 
 MAP = "*value-map.png"  # beside the journal of a lesson whose problem is a grid with two axes
 MOST_MAP = 1 << 22  # bytes
@@ -240,5 +241,4 @@ def _finished(pupil: Pupil, folder: Path, lesson: int) -> tuple[_Finished | None
     except (KeyError, TypeError, AttributeError, IndexError):
         return None, f"'{folder}': what is kept of its end is no document of a lesson"
     except ValidationError as error:
-        why = error.errors(include_url=False)[0]
-        return None, f"'{folder}': what is kept of its end: {'.'.join(map(str, why['loc']))}: {why['msg']}"
+        return None, f"'{folder}': what is kept of its end: {first_fault(error)}"

@@ -7,13 +7,12 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Final, Literal
 
-from pydantic import TypeAdapter, ValidationError
-
 from lab.advice.answer_times import Moment
 from lab.classroom.questionnaire import Answer
 from lab.classroom.study_protocol import Kind, PlannedStep
 from lab.errors import BadInput
-from lab.files import read_limited, write_whole
+from lab.files import write_whole
+from lab.tasks.record import read_json
 
 FILE = "participant.json"
 FORMAT: Final = "teaching-lab participant 1"
@@ -60,14 +59,7 @@ class Participant:
     def read(cls, folder: Path, number: int, name: str) -> "Participant":
         """The participant of a folder. Raises BadInput if the file is missing or damaged, or is of somebody else."""
         path = folder / FILE
-        try:
-            read = TypeAdapter(cls).validate_json(read_limited(path, MOST_BYTES), strict=True)
-        except OSError as error:
-            raise BadInput(f"participant '{path}': {error.strerror or error}") from None
-        except ValidationError as error:
-            why = error.errors(include_url=False)[0]
-            at = ".".join(map(str, why["loc"]))
-            raise BadInput(f"participant '{path}': {at}: {why['msg']}: a file of lab class --study is wanted") from None
+        read = read_json(path, cls, f"participant '{path}'", "a file of lab class --study is wanted", MOST_BYTES)
         if (read.number, read.participant) != (number, name):
             raise BadInput(f"participant '{path}' is {read.participant} ({read.number}): wanted {name} ({number})")
         return read

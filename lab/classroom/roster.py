@@ -14,7 +14,7 @@ from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 from annotated_types import Ge, Le, MinLen
-from pydantic import StringConstraints, TypeAdapter, ValidationError
+from pydantic import StringConstraints
 
 from lab.classroom.class_lesson import (
     ClassLesson,
@@ -25,7 +25,8 @@ from lab.classroom.class_lesson import (
     name_of,
 )
 from lab.errors import BadInput
-from lab.files import is_file, read_limited, write_whole
+from lab.files import is_file, write_whole
+from lab.tasks.record import read_json
 
 FILE = "class.json"
 LATER = (
@@ -164,14 +165,7 @@ class Roster:
             raise BadInput(
                 f"'{folder}' ({option}) holds no class: a folder with {FILE} is wanted, as lab class writes it"
             )
-        try:
-            kept = TypeAdapter(_Kept).validate_json(read_limited(path, MOST_BYTES), strict=True)
-        except OSError as error:
-            raise BadInput(f"{where}: {error.strerror or error}") from None
-        except ValidationError as error:
-            why = error.errors(include_url=False)[0]
-            at = ".".join(map(str, why["loc"]))
-            raise BadInput(f"{where}: {at}: {why['msg']}: a file of lab class is wanted") from None
+        kept = read_json(path, _Kept, where, "a file of lab class is wanted", MOST_BYTES)
         lessons = tuple(lesson_from_json(options, where) for options in kept.lessons)
         for lesson in lessons:
             allowed = advisors_of(lesson, kept.study is not None)

@@ -3,13 +3,22 @@
 from dataclasses import asdict, replace
 from math import inf, isfinite
 from pathlib import Path
-from typing import Annotated, Any, Self, cast
+from typing import Annotated, Any, Self, TypeVar, cast
 
-from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, ValidationInfo, field_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    GetCoreSchemaHandler,
+    TypeAdapter,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+)
 from pydantic_core import CoreSchema
 
 from lab import files
-from lab.errors import BadInput, counted, unknown
+from lab.errors import BadInput, counted, shortened, unknown
 from lab.learning.gates import GATES
 from lab.learning.session_result import check_members
 from lab.learning.settings import SETTINGS, GateSettings, LearnerSettings
@@ -21,6 +30,7 @@ MAX_SHORT_BYTES = 1_000_000  # of a file without a world: reading a longer one t
 MAX_REWARD = 1_000_000  # in sums with larger rewards, small ones are lost; much larger ones overflow
 
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9 _-]{0,39}$"
+Kept = TypeVar("Kept")
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
 Count = Annotated[int, Field(ge=1, le=100)]
 
@@ -148,6 +158,27 @@ def read_text(path: Path) -> str:
         raise BadInput(f"{path}: cannot be read: {error.strerror or error}") from None
     except UnicodeDecodeError as error:
         raise BadInput(f"{path}: cannot be read: {error}") from None
+
+
+def first_fault(error: ValidationError) -> str:
+    """The first fault that a validation found, with its place and the bad value: "port = 'x': Input should be ..."."""
+    first = error.errors(include_url=False)[0]
+    value = "" if first["type"] == "missing" else f" = {shortened(repr(first['input']))}"
+    return f"{'.'.join(map(str, first['loc']))}{value}: {first['msg']}"
+
+
+def read_json(path: Path, kind: type[Kept], which: str, wanted: str, most_bytes: int = MAX_FILE_BYTES) -> Kept:
+    """The record in a JSON file that the lab has kept; kind: its dataclass, whose fields are checked strictly.
+
+    which: the file for messages, such as "class 'monday/class.json' (--resume)"; wanted: what it should be. Raises BadInput for
+    a file that cannot be read, is longer than `most_bytes`, or holds anything else.
+    """
+    try:
+        return TypeAdapter(kind).validate_json(files.read_limited(path, most_bytes), strict=True)
+    except OSError as error:
+        raise BadInput(f"{which}: {error.strerror or error}") from None
+    except ValidationError as error:
+        raise BadInput(f"{which}: {first_fault(error)}: {wanted}") from None
 
 
 def write_whole(path: Path, text: str) -> None:

@@ -16,13 +16,14 @@ from pathlib import Path
 from platform import python_version
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import StringConstraints, TypeAdapter, ValidationError
+from pydantic import StringConstraints
 
 from lab.errors import BadInput
 from lab.files import code_key, is_file, read_limited, within, write_whole
 from lab.learning.problem import Problem
 from lab.plugins.code_file import files_taken
 from lab.tasks.grid_world import RANDOM
+from lab.tasks.record import read_json
 from lab.tasks.task_file import find
 from lab.teaching import problem_file
 from lab.version import __version__
@@ -211,14 +212,7 @@ def read_inputs(folder: Path) -> KeptInputs | None:
     path = folder / FILE
     if not is_file(path):
         return None
-    try:
-        return TypeAdapter(KeptInputs).validate_json(read_limited(path, MOST_BYTES), strict=True)
-    except OSError as error:
-        raise BadInput(f"'{path}' cannot be read: {error.strerror or error}") from None
-    except ValidationError as error:
-        why = error.errors(include_url=False)[0]
-        at = ".".join(map(str, why["loc"]))
-        raise BadInput(f"'{path}': {at}: {why['msg']}: a file of a session's folder is wanted") from None
+    return read_json(path, KeptInputs, f"'{path}'", "a file of a session's folder is wanted", MOST_BYTES)
 
 
 def replaced(folder: Path, kept: KeptInputs, named: Mapping[str, str]) -> tuple[dict[str, Any], list[str]]:
