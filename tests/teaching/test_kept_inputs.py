@@ -179,9 +179,9 @@ def test_a_problem_is_the_same_from_its_file() -> None:
         ({"inputs": {"subtask": {"file": "small.txt", "sha256": {"small.txt": "0" * 64}}}}, "small.txt' was changed: "),
         (
             {"inputs": {"subtask": {"file": "small.txt", "sha256": {"small.txt": "x"}}}},
-            "inputs.subtask.sha256.small.txt: ",
+            "inputs.subtask.sha256.small.txt = 'x': ",
         ),
-        ({"format": "other"}, "format: "),
+        ({"format": "other"}, "format = 'other': "),
     ],
 )
 def test_a_folder_that_leads_elsewhere_or_was_changed_is_refused(
