@@ -311,11 +311,8 @@ PEOPLE = {"terminal": "prompt", "web": "page"}
 MODEL = "llm:"  # begins the name of a language model
 PAGE_OF = "web:"  # begins the name of one of several people with a page each
 MOST_NAME = 40  # characters of a person's name
-EXTERNAL = (
-    *PEOPLE,
-    "web:PERSON",
-    "llm:URL",
-)  # the rows of those whose answers nothing can compute again: a journal holds them
+# the rows of those whose answers nothing can compute again: a journal holds them
+EXTERNAL = (*PEOPLE, "web:PERSON", "llm:URL")
 SKILL_TAUS = {"expert": 0.01, "moderate": 0.1, "limited": 0.3, "novice": 1.0}
 
 

@@ -61,9 +61,8 @@ class Room:
         self.shoulders: set[PupilPage] = set()  # the teacher's pages at pupils' desks
         self._hints: dict[int, str] = {}
         self._helped: set[int] = set()
-        self._finished: dict[
-            tuple[int, int], Json | None
-        ] = {}  # (pupil, earlier lesson) -> its document, if it was finished
+        # (pupil or team, earlier lesson) -> its document, if it was finished
+        self._finished: dict[tuple[int, int], Json | None] = {}
         self._lost: Counter[tuple[int, int]] = Counter()  # (pupil, lesson) -> how often its process was killed
         self._asked: dict[int, tuple[int, float]] = {}  # pupil -> the pending question's number, and when it came
         self._context = processes()

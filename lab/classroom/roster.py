@@ -29,12 +29,8 @@ from lab.files import is_file, write_whole
 from lab.tasks.record import read_json
 
 FILE = "class.json"
-LATER = (
-    "study",
-    "teams",
-    "times",
-    "turn_s",
-)  # fields that older files lack, and that are written only where they say something
+# fields that older files lack, and that are written only where they say something
+LATER = ("study", "teams", "times", "turn_s")
 FORMAT: Final = "teaching-lab class 1"
 MOST_BYTES = 1 << 22
 MOST_PUPILS = 60

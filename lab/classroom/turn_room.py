@@ -17,10 +17,8 @@ from lab.seat.page.page_console import STOP
 from lab.seat.page.page_messages import LayerChoice, Message, PageCommand, Refused, Wish, understood
 from lab.view.summary import delivered_in_words
 
-MOST_COMMANDS, COMMANDS_S = (
-    100,
-    10.0,
-)  # commands of a pupil that are passed on in so many seconds: a journal holds all of them
+# commands of a pupil that are passed on in so many seconds: a journal holds all of them
+MOST_COMMANDS, COMMANDS_S = 100, 10.0
 AWAY_S = 20.0  # after which the turn of a pupil whose page is closed passes on
 HAND_OVER = '{"class":"hand over"}'  # as it comes from the class's own part of a pupil's page
 
@@ -37,9 +35,8 @@ class TurnRoom(Room):
         self._desk: Desk | None = None
         self._turn: int | None = None  # the pupil who operates
         self._ends_s = 0.0  # when the turn passes on, in the event loop's time
-        self._alarms: dict[
-            str, asyncio.TimerHandle
-        ] = {}  # that pass the turn on: when its "time" is up, its pupil is "away"
+        # that pass the turn on: when its "time" is up, its pupil is "away"
+        self._alarms: dict[str, asyncio.TimerHandle] = {}
         self._often: dict[int, Often] = {}  # how often a pupil has given commands lately
         self._folder = roster.folder / RUN
         self._commands = counted_commands(self._folder)

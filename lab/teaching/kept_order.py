@@ -132,7 +132,11 @@ class OrderSession(SessionInFolder):
                 write_whole(self.folder / DURATIONS, json.dumps(dict(self._durations), indent=1) + "\n")
             head = SessionEntry(self.options.to_json(), name, signature, __version__, command="sequence")
             self.journal = Journal.begin(self.folder, head)
-            keep_inputs(self.folder, named_files(self.options))
+            try:
+                keep_inputs(self.folder, named_files(self.options))
+            except BadInput:
+                self.journal.close()
+                raise
         elif read.session.signature != signature:
             raise BadInput(
                 f"session '{self.folder}': it is about '{read.session.problem}' ({read.session.signature[:8]}), and now the "
