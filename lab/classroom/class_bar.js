@@ -71,16 +71,19 @@ const classBar = (() => {
   function tick() {
     if (study === null) return;
     const left = until === null ? null : Math.max(0, Math.ceil((until - performance.now()) / 1000));
-    el("class-left").textContent = study.timed_out ? "Your time is up." : study.over ? "The lesson is over." : left === null ? "" : clock(left);
+    el("class-left").textContent = study.timed_out ? "Your time is up." : study.stuck ? "This lesson has stopped: tell whoever leads the study, or go on." : study.over ? "The lesson is over." : left === null ? "" : clock(left);
   }
 
   async function goOn() {
     el("class-go").disabled = true;
+    let error = "The study does not answer: wait a moment and try again.";
     try {
-      await fetch(`/step/do${search}`, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ do: "go on", step: study.step }) });
-    } finally {
-      location.replace(`/step/${search}`);
-    }
+      const answer = await fetch(`/step/do${search}`, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ do: "go on", step: study.step }) });
+      error = answer.ok ? "" : (await answer.json()).error;
+    } catch { /* it is said below */ }
+    if (!error) location.replace(`/step/${search}`);
+    el("class-left").textContent = error;
+    el("class-go").disabled = false;
   }
 
   el("class-go").onclick = goOn;

@@ -6,14 +6,10 @@ from typing import Any
 
 from lab.errors import BadInput
 from lab.files import is_file
-from lab.gym import parse_name
-from lab.production.order_session import check_order_session
 from lab.production.run_options import RunOptions
 from lab.tasks.task_file import load
 from lab.teaching.kept_order import OrderSessionOptions
 from lab.teaching.lesson_options import DEFAULT_ADVISORS, LessonOptions
-from lab.teaching.subjects import subject_of
-from lab.toolbox.registry import Toolbox
 
 ADVISORS = ("web",)  # of every lesson of a class
 ADVISED = (ADVISORS, ("praise:web",))  # of a lesson of a study
@@ -61,10 +57,10 @@ def name_of(lesson: ClassLesson) -> str:
     return f"{ORDER}{lesson.task}" if isinstance(lesson, OrderSessionOptions) else lesson.subtask
 
 
-def named_by(lesson: ClassLesson) -> list[str]:
-    """The world or sub-task, and the task, that a lesson names."""
-    about = lesson.subtask if isinstance(lesson, LessonOptions) else lesson.task
-    return [name for name in dict.fromkeys([about, lesson.task]) if name]
+def check_own(begun: ClassLesson, lesson: ClassLesson, journal: Path) -> None:
+    """Raises BadInput if a journal is of another lesson than the class has there: its folder may come from somebody else."""
+    if begun.to_json() != lesson.to_json():
+        raise BadInput(f"journal '{journal}' (lab class --resume): it is of another lesson than the class has there")
 
 
 def title_of(lesson: ClassLesson) -> str:
@@ -84,7 +80,11 @@ def _shown(name: str) -> str:
 def module_of(lesson: ClassLesson) -> str:
     """The module that a lesson such as gym:MODULE:ID would import, "" for none."""
     name = name_of(lesson)
-    return parse_name(name, "LESSON").module if name.startswith("gym:") else ""
+    if not name.startswith("gym:"):
+        return ""
+    from lab.gym import parse_name
+
+    return parse_name(name, "LESSON").module
 
 
 def check_lesson(lesson: ClassLesson) -> None:
@@ -92,8 +92,13 @@ def check_lesson(lesson: ClassLesson) -> None:
     if isinstance(lesson, RunOptions):
         lesson.ordered(load(lesson.task))
     elif isinstance(lesson, OrderSessionOptions):
+        from lab.production.order_session import check_order_session
+        from lab.toolbox.registry import Toolbox
+
         check_order_session(lesson, Toolbox())
     else:
+        from lab.teaching.subjects import subject_of
+
         subject_of(lesson)
 
 

@@ -1,6 +1,6 @@
 """What the folder of a class tells of its lessons: learning curves, results and receipts, for its report."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
@@ -10,16 +10,17 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
+from lab.advice.advisors import shown_name
 from lab.advice.entries import FILE, Entry, read_journal
 from lab.advice.receipt import receipt
 from lab.classroom.class_lesson import title_of
 from lab.classroom.curve_chart import Curve, Middle, middle_of
 from lab.classroom.kept_lesson import kept_lesson
 from lab.classroom.roster import Pupil, Roster
-from lab.classroom.tile import best_first, is_order, row_of
+from lab.classroom.tile import Number, Row, best_first, is_order, row_of
 from lab.errors import BadInput
 from lab.files import is_file, read_limited
-from lab.learning.session_events import AdviceRejected, EpisodeEnded
+from lab.learning.session_events import AdviceRejected, AdvisorDropped, AdvisorReadmitted, EpisodeEnded
 from lab.sequencing.cell.objectives import MAKESPAN
 from lab.statistics import proportion_interval
 from lab.tasks.record import first_fault
@@ -27,34 +28,6 @@ from lab.tasks.record import first_fault
 MAP = "*value-map.png"  # beside the journal of a lesson whose problem is a grid with two axes
 MOST_MAP = 1 << 22  # bytes
 MOST_MOVES = 200  # of an order that are read
-
-Number = int | float | None
-
-
-@dataclass(frozen=True)
-class Row:
-    """The row of a finished lesson, see `lab.classroom.tile.row_of`."""
-
-    pupil: int
-    name: str
-    lesson: int
-    skill: str
-    state: str
-    episodes: int
-    solved: bool
-    final_steps: Number
-    optimal_steps: Number
-    answers: int | None
-    own_choice_too: int | None
-    not_best: int | None
-    helped_steps: int | None
-    guided_episodes: int | None
-    misleads: int | None
-    believed: bool
-    tau: Number
-    cost: Number
-    optimal_cost: Number
-    objective: str | None
 
 
 @dataclass(frozen=True)
@@ -87,7 +60,7 @@ class TaughtLesson:
 
     row: None if it is not over. curve: of each episode the steps (or the cost of its order), and whether it was advised.
     worth: None if its journal cannot be read; trouble says why. dropped_at: the episode in which the learner rejected the advice,
-    None if it did not. moves: of its best order, in words.
+    None if it did not; dropped: of a team, the pupils whom it believes no more. moves: of its best order, in words.
     """
 
     pupil: Pupil
@@ -96,6 +69,7 @@ class TaughtLesson:
     curve: tuple[tuple[float, bool], ...] = ()
     worth: Worth | None = None
     dropped_at: int | None = None
+    dropped: tuple[str, ...] = ()
     moves: tuple[str, ...] = ()
     trouble: str = ""
 
@@ -223,9 +197,21 @@ def _taught(pupil: Pupil, folder: Path, lesson: int) -> TaughtLesson:
         tuple((float(one.steps), one.guided) for one in entries if isinstance(one, EpisodeEnded)),
         worth,
         next((one.episode for one in entries if isinstance(one, AdviceRejected)), None),
+        tuple(_dropped(entries)),
         tuple(moves[:MOST_MOVES]),
         trouble,
     )
+
+
+def _dropped(entries: Sequence[Entry]) -> dict[str, None]:
+    """The names of the pupils of a team whom its learner believes no more, in the order in which it dropped them."""
+    dropped: dict[str, None] = {}
+    for entry in entries:
+        if isinstance(entry, AdvisorDropped):
+            dropped[shown_name(entry.advisor)] = None
+        elif isinstance(entry, AdvisorReadmitted):
+            dropped.pop(shown_name(entry.advisor), None)
+    return dropped
 
 
 def _finished(pupil: Pupil, folder: Path, lesson: int) -> tuple[_Finished | None, str]:

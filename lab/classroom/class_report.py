@@ -8,10 +8,10 @@ from typing import Any
 
 from lab.advice.receipt import WIDTH
 from lab.classroom.class_lesson import name_of
-from lab.classroom.class_record import LessonRecord, Number, TaughtLesson, class_record
+from lab.classroom.class_record import LessonRecord, TaughtLesson, class_record
 from lab.classroom.curve_chart import Chart, Curve, Kind, chart_of
 from lab.classroom.roster import Pupil, Roster
-from lab.classroom.tile import HAND_OUTS, REPORT, TABLE
+from lab.classroom.tile import HAND_OUTS, REPORT, TABLE, Number
 from lab.classroom.turn_record import columns_of, kept_rows
 from lab.errors import BadInput, counted
 from lab.files import csv_of, write_whole
@@ -65,7 +65,8 @@ def what_was_believed(one: TaughtLesson) -> str:
         return "unknown"
     if not one.worth.taken:
         return "not given"
-    return "believed to the end" if one.row is not None else "believed so far"
+    believed = "believed to the end" if one.row is not None else "believed so far"
+    return f"{believed}, but not {' and '.join(one.dropped)}" if one.dropped else believed
 
 
 def better_episodes(one: TaughtLesson) -> str:
@@ -149,12 +150,16 @@ def _kind(one: TaughtLesson) -> Kind:
 # ---- the pages -----------------------------------------------------------------------------------------------------------
 
 
-def report_page(title: str, records: Sequence[LessonRecord], pupils: int) -> str:
-    """The report: for each lesson all curves in one picture, the table, what advice was worth, and the best teacher."""
+def report_page(title: str, records: Sequence[LessonRecord], pupils: int, run: Sequence[Json] = ()) -> str:
+    """The report: for each lesson all curves in one picture, the table, what advice was worth, and the best teacher.
+
+    run: the rows of a finished run by hand, see `lab.classroom.turn_record.rows_of_run`.
+    """
     return _rendered(
         "class_report.html",
         title=title,
         pupils=pupils,
+        run=run,
         lessons=[(record, class_chart(record), why_best(record)) for record in records],
     )
 
@@ -169,9 +174,12 @@ def hand_outs(records: Sequence[LessonRecord], pupils: Sequence[Pupil]) -> list[
     return handed
 
 
-def hand_out_page(title: str, handed: Sequence[HandOut]) -> str:
-    """A page for each pupil: the curve, the receipt in words, and the map with the learned path, or the learned order."""
-    return _rendered("hand_out.html", title=title, handed=handed)
+def hand_out_page(title: str, handed: Sequence[HandOut], run: Sequence[Json] = ()) -> str:
+    """A page for each pupil: the curve, the receipt in words, and the map with the learned path, or the learned order.
+
+    run: as in `report_page`.
+    """
+    return _rendered("hand_out.html", title=title, handed=handed, run={row["pupil"]: row for row in run})
 
 
 def _rendered(template: str, **known: Any) -> str:
@@ -197,9 +205,10 @@ def title_of_class(roster: Roster) -> str:
 def page_now(roster: Roster, name: str) -> str:
     """The report or the hand-outs of a class at this moment; name: REPORT or HAND_OUTS."""
     records, pupils, title = class_record(roster), roster.learners, title_of_class(roster)
+    run = kept_rows(roster)
     if name == REPORT:
-        return report_page(title, records, len(roster.present))
-    return hand_out_page(title, hand_outs(records, pupils))
+        return report_page(title, records, len(roster.present), run)
+    return hand_out_page(title, hand_outs(records, pupils), run)
 
 
 # ---- the files -----------------------------------------------------------------------------------------------------------
@@ -212,15 +221,16 @@ def write_report(roster: Roster, rows: Sequence[Json] | None = None) -> Json:
     file cannot be written.
     """
     records, pupils, title = class_record(roster), roster.learners, title_of_class(roster)
+    run = kept_rows(roster)
     if rows is None:
-        rows = [asdict(row) for record in records for row in record.finished] + kept_rows(roster)
+        rows = [asdict(row) for record in records for row in record.finished] + run
     handed = hand_outs(records, pupils)
     pages = {
         TABLE: csv_of(rows, columns_of(roster)),
-        REPORT: report_page(title, records, len(roster.present)),
-        HAND_OUTS: hand_out_page(title, handed),
+        REPORT: report_page(title, records, len(roster.present), run),
+        HAND_OUTS: hand_out_page(title, handed, run),
     }
-    pages |= {f"{one[0].folder}/{HAND_OUT}": hand_out_page(title, [one]) for one in handed}
+    pages |= {f"{one[0].folder}/{HAND_OUT}": hand_out_page(title, [one], run) for one in handed}
     for name, text in pages.items():
         path = roster.folder / name
         try:

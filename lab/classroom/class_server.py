@@ -34,14 +34,14 @@ from lab.classroom.class_place import Place, files_of
 from lab.classroom.class_report import page_now
 from lab.classroom.code_picture import code_svg
 from lab.classroom.desk import Desk, nothing_shown
+from lab.classroom.desk_process import DRAWN_S, LAST_S
 from lab.classroom.door import Door, Often
 from lab.classroom.room import OVER, RELOAD, REMOVED, PupilPage, Room
-from lab.classroom.rooms import room_of
+from lab.classroom.rooms import obey, room_of
 from lab.classroom.roster import Roster
 from lab.classroom.step_pages import StepPages
 from lab.classroom.study import Study
 from lab.classroom.study_room import StudyRoom
-from lab.classroom.teacher_messages import obey
 from lab.classroom.tile import HAND_OUTS, REPORT
 from lab.classroom.turn_record import columns_of
 from lab.errors import BadInput, WorkFailed
@@ -50,7 +50,8 @@ from lab.view.printed_page import POLICY
 from lab.view.server import answer_of, config_of, listening
 from lab.view.server_page import quiet_when_full
 
-START_S, STOP_S = 10.0, 30.0
+START_S = 10.0
+STOP_S = DRAWN_S + LAST_S + 5.0  # the time that desks have for what is over, and a little more
 AGAIN_S = 0.5  # after which a page whose desk was killed is told to load again
 READ_S = 0.005  # least interval between two messages from a page
 TILES_EVERY_S = 0.25
@@ -90,7 +91,12 @@ class ClassServer:
         base = f"{place.hosts[0]}:{self.port}"
         self.join_url = f"{place.scheme}://{base}/?code={roster.code}"
         self.teacher_url = f"{place.scheme}://{base}/teacher/?token={self._token}"
-        self._picture = code_svg(self.join_url)
+        self._told = {  # to the teacher's page, once
+            "code": roster.code,
+            "join": self.join_url,
+            "picture": code_svg(self.join_url),
+            "lessons": [title_of(lesson) for lesson in roster.lessons],
+        }
         self._files = files_of(place.hosts, self.port, study is not None)
 
     def __enter__(self) -> "ClassServer":
@@ -127,13 +133,16 @@ class ClassServer:
                 self._loop.call_soon_threadsafe(self._stopped.set)
             self._thread.join(STOP_S)
 
-    def call(self, function: Callable[[], Any]) -> Any:
-        """The result of a function of the room, called in the server's event loop from another thread."""
+    def call(self, function: Callable[[], Any], wait_s: float = START_S) -> Any:
+        """The result of a function of the room, called in the server's event loop from another thread.
+
+        Raises TimeoutError if it does not come within `wait_s` [s].
+        """
 
         async def called() -> Any:
             return function()
 
-        return asyncio.run_coroutine_threadsafe(called(), self._loop).result(START_S)
+        return asyncio.run_coroutine_threadsafe(called(), self._loop).result(wait_s)
 
     async def _serve(self) -> None:
         self._loop, self._stopped = asyncio.get_running_loop(), asyncio.Event()
@@ -342,7 +351,7 @@ class ClassServer:
             stirred.clear()
             tiles, now = (
                 self.room.tiles(),
-                {"class": self._known(), "rows": self.room.rows(), "teams": self.room.teams()},
+                {"place": self._told, "class": self._known(), "rows": self.room.rows(), "teams": self.room.teams()},
             )
             news = {part: value for part, value in now.items() if told.get(part) != value}
             changed = [tile for number, tile in tiles.items() if seen.get(number) != tile]
@@ -356,12 +365,7 @@ class ClassServer:
 
     def _known(self) -> dict[str, Any]:
         return {
-            "code": self.roster.code,
-            "join": self.join_url,
-            "picture": self._picture,
-            "lessons": [title_of(lesson) for lesson in self.roster.lessons],
             "paused": self.room.paused,
-            "most": self.roster.most,
             "study": None if self._study is None else self._study.told(),
             "turns": self.room.turns(),
             "open": self._door.is_open,
@@ -381,3 +385,5 @@ class ClassServer:
                     obey(self.room, said)
         except (BadInput, ValueError, RecursionError) as error:
             await sender(browser)(json.dumps({"refusal": str(error)}))
+        except OSError as error:
+            await sender(browser)(json.dumps({"refusal": f"The class cannot be written: {error.strerror}."}))

@@ -67,6 +67,7 @@ class Desk:
         self._process: Any = None
         self._watching: list[asyncio.Task[None]] = []
         self._turn, self._closed = asyncio.Lock(), False
+        self._silent = asyncio.Event()  # the process has ended, and all that it said has been heard
 
     async def open(self, context: Any) -> None:
         """Start the process, unless the desk was closed meanwhile."""
@@ -110,6 +111,7 @@ class Desk:
                     pipe.send("close")
             if self._process is not None:
                 await asyncio.to_thread(self._process.join)
+                await self._silent.wait()
         self.ready.set()
 
     async def page(self, watches: bool = False, name: str = "") -> ClientConnection:
@@ -161,6 +163,7 @@ class Desk:
         self._addresses = {}
         self.questions.clear()
         self.ready.set()
+        self._silent.set()
         self.on_news()
 
     async def _watch(self, name: str) -> None:

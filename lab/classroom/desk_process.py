@@ -17,7 +17,7 @@ from typing import Any
 from lab.advice.advisors import PAGE_OF
 from lab.advice.answer_times import AnswerTimes
 from lab.advice.entries import FILE, is_unbegun, read_journal
-from lab.classroom.class_lesson import ClassLesson
+from lab.classroom.class_lesson import ClassLesson, check_own
 from lab.classroom.operate_lesson import operated_lesson
 from lab.classroom.order_lesson import order_lesson
 from lab.errors import BadInput, LabError
@@ -153,6 +153,8 @@ def _table_lesson(
     """The document of `lab teach --json`; a lesson that is over, whose document was lost, is run again from its journal."""
     kept = None
     if is_file(order.folder / FILE):
+        if not is_unbegun(order.folder / FILE):
+            check_own(read_session(order.folder, RESUMED, LessonOptions)[1], options, order.folder / FILE)
         kept = KeptSession(order.folder, RESUMED, read_only=is_over(order.folder), trusted=order.modules)
         options = kept.options
     else:
@@ -195,7 +197,7 @@ def _until_closed(pipe: Connection, signals: _Signals, folder: Path) -> None:
         while pipe.recv() == FINISH:
             signals.finish.set()
     signals.closed.set()
-    if signals.taught.is_set() or is_over(folder):
+    if signals.taught.is_set() or signals.finish.is_set() or is_over(folder):
         threading.Event().wait(DRAWN_S)
     interrupt_main()
     threading.Event().wait(LAST_S)

@@ -8,7 +8,7 @@ from typing import Any
 
 from lab.classroom.class_place import Place
 from lab.classroom.class_report import write_report
-from lab.classroom.class_server import ClassServer
+from lab.classroom.class_server import STOP_S, ClassServer
 from lab.errors import BadInput
 from lab.files import is_file
 
@@ -56,24 +56,29 @@ def attend(server: ClassServer, tell: Callable[[str], None]) -> None:
     known = dict[int, Json]()
     while not server.ended.is_set():
         try:
-            tiles = server.call(server.room.tiles)
+            states = server.call(server.room.states)
         except TimeoutError:  # the computer is busy, or was asleep
             continue
-        for number, tile in tiles.items():
+        for number, now in states.items():
             before = known.get(number)
             if before is None:
-                tell(f"{tile['name']} ({number}) has a desk: lesson {tile['lesson']}")
-            elif (before["lesson"], before["state"]) != (tile["lesson"], tile["state"]) and tile["state"] != "opening":
-                why = f": {tile['text']}" if tile["text"] else ""
-                tell(f"{tile['name']} ({number}), lesson {tile['lesson']}: {tile['state']}{why}")
-        known = tiles
+                tell(f"{now['name']} ({number}) has a desk: lesson {now['lesson']}")
+            elif (before["lesson"], before["state"]) != (now["lesson"], now["state"]) and now["state"] != "opening":
+                why = f": {now['text']}" if now["text"] else ""
+                tell(f"{now['name']} ({number}), lesson {now['lesson']}: {now['state']}{why}")
+        known = states
         server.ended.wait(LOOK_S)
 
 
 def closing(server: ClassServer) -> Json:
-    """The document of the class so far; its table, report and hand-outs are written into its folder. Raises BadInput."""
-    document = write_report(server.roster, server.call(server.room.rows))
-    tiles = server.call(server.room.standing)
+    """The document of the class, which ends now; its table, report and hand-outs are written into its folder. Raises BadInput.
+
+    Nobody can withdraw or be removed while the files are written, because the server has stopped.
+    """
+    standing = server.call(server.room.standing, STOP_S)
+    server.stop()
+    document = write_report(server.roster, server.room.rows())
     for pupil in document["pupils"]:
-        pupil |= {name: tiles[pupil["number"]][name] for name in ("lesson", "state", "text")}
+        known = standing.get(pupil["number"], pupil)
+        pupil |= {name: known[name] for name in ("lesson", "state", "text")}
     return document

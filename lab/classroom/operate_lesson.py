@@ -5,7 +5,8 @@ from threading import Event, Thread
 from typing import Any
 
 from lab.advice.advising import Advising
-from lab.errors import BadInput, counted
+from lab.classroom.class_lesson import check_own
+from lab.errors import counted
 from lab.production.operation.commands import COMMANDS
 from lab.production.operation.desk import LISTEN_S, Desk
 from lab.production.operation.operated_run import kept_operation, operating_desk
@@ -32,8 +33,7 @@ def operated_lesson(
     """
     if is_run(folder):
         kept, task = kept_task(folder, "lab class --resume")
-        if kept.to_json() != options.to_json():  # a folder may come from somebody else: the class says what is done
-            raise BadInput(f"run '{folder}' (lab class --resume): it is of another task than the class has there")
+        check_own(kept, options, folder)
         journal = RunJournal.resume(folder)
     else:
         task = load(options.task)

@@ -5,7 +5,7 @@ from typing import Any
 
 from lab.advice.advising import Advising
 from lab.advice.entries import FILE, is_unbegun
-from lab.errors import BadInput
+from lab.classroom.class_lesson import check_own
 from lab.files import is_file
 from lab.production.order_session import sequenced
 from lab.seat.lesson_seat import LessonSeat
@@ -37,8 +37,7 @@ def _kept(options: OrderSessionOptions, folder: Path, toolbox: Toolbox) -> Order
     path = folder / FILE
     if is_file(path) and not is_unbegun(path):
         read, begun = read_session(folder, "lab class --resume", OrderSessionOptions)
-        if begun.to_json() != options.to_json():  # a folder may come from somebody else: the class says what is done
-            raise BadInput(f"journal '{path}' (lab class --resume): it is of another lesson than the class has there")
+        check_own(begun, options, path)
         return OrderSession(begun, toolbox, read, read_only=read.closed is not None)
     check_new(folder)
     return OrderSession(options, toolbox, out=folder)

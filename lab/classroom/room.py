@@ -4,7 +4,7 @@ import asyncio
 import json
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -63,7 +63,8 @@ class Room:
         self._helped: set[int] = set()
         # (pupil or team, earlier lesson) -> its document, if it was finished
         self._finished: dict[tuple[int, int], Json | None] = {}
-        self._lost: Counter[tuple[int, int]] = Counter()  # (pupil, lesson) -> how often its process was killed
+        self._keeping: set[Path] = set()  # folders of lessons that are just being kept
+        self._lost: Counter[Path] = Counter()  # a lesson's folder -> how often its process was killed
         self._asked: dict[int, tuple[int, float]] = {}  # pupil -> the pending question's number, and when it came
         self._context = processes()
         self._starting = asyncio.Semaphore(AT_ONCE)
@@ -87,7 +88,8 @@ class Room:
         """Close all desks: lessons that are not over can be resumed."""
         self.ended.set()
         await asyncio.gather(*(desk.close() for desk in {*self.desks.values()}))
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        while self._tasks:  # what a desk says at its end is kept by a task of its own
+            await asyncio.gather(*self._tasks, return_exceptions=True)
 
     # ---- desks
 
@@ -99,8 +101,20 @@ class Room:
         """Open the desk of a pupil at the pupil's lesson: the lesson begins, goes on, or is shown if it is over."""
         before = self.desks.get(pupil.number)
         desk = self.desks[pupil.number] = Desk(self.order(pupil))
-        desk.on_news = lambda: self._stirred(pupil.number, desk)
+        desk.on_news = lambda: self._stirred(desk)
         self._place(desk, before, self.opens(pupil))
+
+    def _share(self, order: DeskOrder, pupils: list[Pupil], before: Desk | None, begins: bool) -> Desk:
+        """A new desk for several pupils, in the place of another one; begins: whether a lesson that is not over begins."""
+        desk = Desk(order)
+        self.desks |= dict.fromkeys([pupil.number for pupil in pupils], desk)
+        desk.on_news = lambda: self._stirred(desk)
+        self._place(desk, before, begins)
+        for pupil in pupils if before is not None else ():
+            self._asked.pop(pupil.number, None)
+            if page := self.pages.get(pupil.number):
+                self._start(page.close(RELOAD))
+        return desk
 
     def order(self, learner: Pupil) -> DeskOrder:
         """What is taught at the desk of one of the roster's `learners`."""
@@ -145,31 +159,48 @@ class Room:
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
-    def _stirred(self, number: int, desk: Desk) -> None:
+    def at_desk(self, desk: Desk) -> list[int]:
+        """The numbers of the pupils at a desk; none if another one is in its place."""
+        return [number for number, other in self.desks.items() if other is desk]
+
+    def _stirred(self, desk: Desk) -> None:
         """Something of a desk has changed: keep a finished lesson, note when a question came."""
         self._keep_lesson(desk)
-        if self.desks.get(number) is not desk:
-            return  # it was closed, and another one is in its place
-        self._pose(number, desk)
-        if desk.state == "lost" and not (self.ended.is_set() or desk.is_closed):
-            lesson = (number, self.roster.pupils[number - 1].lesson)
-            self._lost[lesson] += 1
-            if self._lost[lesson] <= MOST_LOST:
-                self.open_again(number)
-        self.on_news()
+        pupils = self.at_desk(desk)
+        for number in pupils:
+            self._pose(number, desk)
+        is_lost = desk.state == "lost" and not (self.ended.is_set() or desk.is_closed)
+        if pupils and is_lost and self.opens(self._pupil(pupils[0])):
+            self._lost[desk.order.folder] += 1
+            if self._lost[desk.order.folder] <= MOST_LOST:
+                self.open_again(pupils[0])
+        if pupils:
+            self.on_news()
 
     def _keep_lesson(self, desk: Desk) -> None:
         """Keep a lesson that is over, once its page has said so or the desk is being closed."""
-        if desk.state != "over" or is_file(desk.order.folder / KEPT):
+        folder = desk.order.folder
+        if desk.state != "over" or folder in self._keeping or is_file(folder / KEPT):
             return
         page = desk.parts
         if not page.get("ended"):
             if not desk.is_closed or desk.result is None:
                 return
             page = page | {"question": None, "receipt": desk.result.get("receipt"), "ended": LESSON_OVER}
-        with suppress(OSError):  # a full disk: the journal has been written, and the lesson is over anyway
-            write_whole(desk.order.folder / KEPT, json.dumps({"document": desk.result, "page": page}).encode())
-        self._finished.clear()
+        self._keeping.add(folder)
+        self._start(self._kept(folder, {"document": desk.result, "page": page}))
+
+    async def _kept(self, folder: Path, lesson: Json) -> None:
+        """Write what is kept of a finished lesson, without keeping the class waiting."""
+
+        def written() -> None:
+            with suppress(OSError):  # a full disk: the journal has been written, and the lesson is over anyway
+                write_whole(folder / KEPT, json.dumps(lesson).encode())
+
+        await asyncio.to_thread(written)
+        self._keeping.discard(folder)
+        self._finished = {at: document for at, document in self._finished.items() if document is not None}
+        self.on_news()
 
     def _pose(self, number: int, desk: Desk) -> None:
         """Note when a question has come to a pupil."""
@@ -272,23 +303,32 @@ class Room:
     def go_on(self, number: int | None, lesson: int | None = None) -> None:
         """The next lesson, or the lesson with a number from 0, of a pupil, or of all if `number` is None.
 
-        Who is at that lesson already stays there. Raises BadInput for a pupil or lesson that there is not.
+        Who is at that lesson already stays there. Raises BadInput for a pupil or lesson that there is not, and OSError if the
+        roster cannot be written; then nobody goes on.
         """
         pupils = self.roster.present if number is None else [self._pupil(number)]
-        for pupil in pupils:
-            wanted = pupil.lesson + 1 if lesson is None else lesson
-            if number is None and wanted >= len(self.roster.lessons):
-                continue
-            if wanted == pupil.lesson:
-                continue
-            self._finished.pop((pupil.number, pupil.lesson), None)
-            moved = self.roster.move(pupil.number, wanted)
-            self._hints.pop(pupil.number, None)
-            self._helped.discard(pupil.number)
-            self._asked.pop(pupil.number, None)
-            self.seat(moved)
-            if page := self.pages.get(pupil.number):
+        moved = {
+            pupil.number: to for pupil in pupils if (to := self._to_lesson(pupil, number is None, lesson)) is not None
+        }
+        self._move(moved)
+        for one in moved:
+            self.seat(self._pupil(one))
+            if page := self.pages.get(one):
                 self._start(page.close(RELOAD))
+
+    def _to_lesson(self, learner: Pupil, all_go: bool, lesson: int | None) -> int | None:
+        """The lesson (from 0) to which a pupil or team goes; None if it stays, or if all go on and it is at the last one."""
+        wanted = learner.lesson + 1 if lesson is None else lesson
+        stays = wanted == learner.lesson or (all_go and wanted >= len(self.roster.lessons))
+        return None if stays else wanted
+
+    def _move(self, lessons: Mapping[int, int]) -> None:
+        """Let pupils go on with lessons, by their numbers, and forget what was of the lesson before. Raises as `Roster.move`."""
+        self.roster.move(lessons)
+        for number in lessons:
+            self._hints.pop(number, None)
+            self._helped.discard(number)
+            self._asked.pop(number, None)
 
     def begin_lessons(self) -> None:
         """Begin the lessons that wait for the teacher. Raises BadInput if none does."""
@@ -308,19 +348,25 @@ class Room:
             raise BadInput(f"desk {number} is {state}: nothing is to be mended")
 
     def remove(self, number: int) -> None:
-        """Take a pupil's seat away; somebody else may join instead. Raises BadInput for a pupil that is not there."""
+        """Take a pupil's seat away; somebody else may join instead.
+
+        Raises BadInput for a pupil that is not there, and OSError if the roster cannot be written; then the pupil stays.
+        """
         self._pupil(number)
-        try:
-            self.roster.remove(number)
-        except OSError as error:
-            raise BadInput(f"pupil {number}: the class cannot be written: {error.strerror}") from None
-        if page := self.pages.pop(number, None):
-            self._start(page.close(REMOVED))
+        self.roster.remove(number)
+        self._close_pages(number, REMOVED)
+        self.pages.pop(number, None)
         self._helped.discard(number)
         for known in (self._hints, self._asked):
             known.pop(number, None)
         self._leave(number)
         self.on_news()
+
+    def _close_pages(self, number: int, code: int) -> None:
+        """Close the pages at a pupil's desk: the pupil's own, and those that look over the shoulder."""
+        for page in [self.pages.get(number), *(page for page in self.shoulders if page.number == number)]:
+            if page is not None:
+                self._start(page.close(code))
 
     def _leave(self, number: int) -> None:
         """Close the desk of a pupil who was removed."""
@@ -361,9 +407,16 @@ class Room:
             rows += best_first([row_of(learner, lesson, document) for learner, document in finished if document])
         return rows
 
+    def states(self) -> dict[int, Json]:
+        """Of each pupil's desk: the pupil's name, the lesson's number, its state and why it failed."""
+        return {pupil.number: self._state(pupil, self.desks[pupil.number]) for pupil in self.roster.present}
+
     def standing(self) -> dict[int, Json]:
-        """Lesson, state and text of each of the roster's `learners`, by number."""
-        return self.tiles()
+        """The same of each of the roster's `learners`, by number."""
+        return {learner.number: self._state(learner, self.desk_of(learner)) for learner in self.roster.learners}
+
+    def _state(self, learner: Pupil, desk: Desk) -> Json:
+        return {"name": learner.name, "lesson": learner.lesson + 1, "state": desk.state, "text": desk.text}
 
     def teams(self) -> list[Json]:
         """What the teacher sees of each team; none in a class without teams."""

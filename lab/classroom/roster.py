@@ -6,7 +6,7 @@ Pupils are pseudonyms and hashes of keys: nobody's name or key is kept unless th
 import hashlib
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from secrets import choice, compare_digest, token_urlsafe
@@ -30,7 +30,7 @@ from lab.tasks.record import read_json
 
 FILE = "class.json"
 # fields that older files lack, and that are written only where they say something
-LATER = ("study", "teams", "times", "turn_s")
+OPTIONAL_FIELDS = ("study", "teams", "times", "turn_s")
 FORMAT: Final = "teaching-lab class 1"
 MOST_BYTES = 1 << 22
 MOST_PUPILS = 60
@@ -197,7 +197,7 @@ class Roster:
             *(FORMAT, self.code, lessons, self.seed, self.most, self.typed_names, self.port, self.pupils),
             *(self.study, self.teams, self.times, self.turn_s),
         )
-        record = {name: value for name, value in asdict(kept).items() if name not in LATER or value}
+        record = {name: value for name, value in asdict(kept).items() if name not in OPTIONAL_FIELDS or value}
         write_whole(self.folder / FILE, (json.dumps(record, indent=1) + "\n").encode())
 
     # ---- pupils
@@ -210,6 +210,7 @@ class Roster:
         """A new pupil and the key of their address; None for a wrong code. Raises Full.
 
         name: what the pupil typed, which counts only in a class of typed names; a name that is taken gets a number.
+        Raises OSError if the roster cannot be written; then nobody has joined.
         """
         if not self.is_code(code):
             return None
@@ -222,8 +223,7 @@ class Roster:
         pupil = Pupil(
             len(self.pupils) + 1, self._free(wanted or self._pseudonym()), hash_of(key), lesson=lesson, team=team
         )
-        self.pupils.append(pupil)
-        self.write()
+        self._take_over([*self.pupils, pupil])
         return pupil, key
 
     def is_code(self, code: str) -> bool:
@@ -261,44 +261,62 @@ class Roster:
         self.check_room()
         pupil = Pupil(len(self.pupils) + 1, self._free(name or self._pseudonym()), hash_of(key))
         position = self.study.free_position()
-        self.pupils.append(pupil)
-        self.study.positions.append(position)
-        try:
-            self.write()
-        except OSError:
-            self.pupils.pop()
-            self.study.positions.pop()
-            raise
+        self._take_over([*self.pupils, pupil], [*self.study.positions, position])
         return pupil, position
 
     def retire(self, number: int) -> None:
-        """Keep of a participant the number alone; the position in the design is free again. Raises OSError."""
+        """Keep of a participant the number alone; the position in the design is free again.
+
+        Raises OSError; then nothing has changed.
+        """
         assert self.study is not None
-        self.pupils[number - 1] = Pupil(number, "", "")
-        self.study.positions[number - 1] = None
-        self.write()
+        positions = [None if at == number else place for at, place in enumerate(self.study.positions, start=1)]
+        self._take_over(self._with(Pupil(number, "", "")), positions)
 
     def of_key(self, key: str) -> Pupil | None:
         """The pupil with this key; None for any other text."""
         hashed = hash_of(key)
         return next((pupil for pupil in self.present if compare_digest(pupil.key_hash, hashed)), None)
 
-    def move(self, number: int, lesson: int) -> Pupil:
-        """The pupil with this number, who goes on with a lesson. Raises BadInput for a wrong number of either."""
-        if not 1 <= number <= len(self.pupils):
-            raise BadInput(f"pupil {number}: the class has {len(self.pupils)}")
-        if not 0 <= lesson < len(self.lessons):
-            raise BadInput(f"lesson {lesson + 1}: the class has {len(self.lessons)}")
-        moved = self.pupils[number - 1] = replace(self.pupils[number - 1], lesson=lesson)
-        self.write()
-        return moved
+    def move(self, lessons: Mapping[int, int]) -> None:
+        """Let pupils go on with lessons (from 0), by the pupils' numbers.
+
+        Raises BadInput for a wrong number of either, and OSError; then nobody has moved.
+        """
+        for number, lesson in lessons.items():
+            self._check_number(number)
+            if not 0 <= lesson < len(self.lessons):
+                raise BadInput(f"lesson {lesson + 1}: the class has {len(self.lessons)}")
+        self._take_over(self._with(*(replace(self.pupils[n - 1], lesson=lesson) for n, lesson in lessons.items())))
 
     def remove(self, number: int) -> None:
-        """Take a pupil's seat and key, for good; the folder of the pupil's lessons stays. Raises BadInput for a wrong number."""
+        """Take a pupil's seat and key, for good; the folder of the pupil's lessons stays.
+
+        Raises BadInput for a wrong number, and OSError; then the pupil keeps both.
+        """
+        self._check_number(number)
+        self._take_over(self._with(replace(self.pupils[number - 1], key_hash="", removed=True)))
+
+    def _check_number(self, number: int) -> None:
         if not 1 <= number <= len(self.pupils):
             raise BadInput(f"pupil {number}: the class has {len(self.pupils)}")
-        self.pupils[number - 1] = replace(self.pupils[number - 1], key_hash="", removed=True)
-        self.write()
+
+    def _with(self, *changed: Pupil) -> list[Pupil]:
+        """The pupils, some of whom have changed."""
+        new = {pupil.number: pupil for pupil in changed}
+        return [new.get(pupil.number, pupil) for pupil in self.pupils]
+
+    def _take_over(self, pupils: list[Pupil], positions: list[int | None] | None = None) -> None:
+        """Write changed pupils, and a study's positions. Raises OSError: then everything is as it was."""
+        before = self.pupils, self.study
+        self.pupils = pupils
+        if self.study is not None and positions is not None:
+            self.study = replace(self.study, positions=positions)
+        try:
+            self.write()
+        except OSError:
+            self.pupils, self.study = before
+            raise
 
     def _pseudonym(self) -> str:
         """A name that depends on the class's seed and the pupil's number alone."""

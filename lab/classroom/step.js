@@ -2,6 +2,7 @@
 "use strict";
 
 const el = (id) => document.getElementById(id), LOOK_MS = 5000;
+const AWAY = "The study does not answer: trying again.";
 let shown = null, questionnaire = null, busy = false;
 
 const asks = async (path, wish) => {
@@ -81,10 +82,11 @@ async function look() {
   try {
     const { status, said } = await asks("/step/state");
     if (busy) return;
+    if (el("told").textContent === AWAY) el("told").textContent = "";
     if (status === 403) show(last("nobody"));
     else if (!same(shown, said)) show(said);
   } catch {
-    el("told").textContent = "The study does not answer: trying again.";
+    el("told").textContent = AWAY;
   }
 }
 

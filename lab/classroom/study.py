@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from shutil import rmtree
 
-from lab.classroom.class_lesson import ClassLesson, named_by
+from lab.classroom.class_lesson import ClassLesson
 from lab.classroom.participant import FORMAT, Participant, timestamp
 from lab.classroom.roster import Pupil, Roster, StudyEntry
 from lab.classroom.study_protocol import MOST_BYTES, PlannedStep, StudyProtocol
@@ -15,6 +15,7 @@ from lab.classroom.tile import HAND_OUTS, REPORT, TABLE
 from lab.errors import BadInput
 from lab.files import read_limited, write_whole
 from lab.teaching.kept_inputs import sha256_of
+from lab.teaching.kept_session import named_files
 from lab.teaching.lesson_options import LessonOptions
 
 PROTOCOL = "protocol.toml"
@@ -102,6 +103,7 @@ class Study:
             rmtree(left)
         for pupil in self.roster.present:
             if pupil.number not in self.people:  # the folder is gone, or was never made
+                self._delete_written()
                 self.roster.retire(pupil.number)
 
     # ---- participants
@@ -120,7 +122,8 @@ class Study:
             self.keep(person.at_next(self.protocol.steps(order)))
         except OSError:
             with suppress(OSError):
-                self.delete(pupil)
+                self.erase(pupil)
+                self.roster.retire(pupil.number)
             raise
         return pupil
 
@@ -137,29 +140,40 @@ class Study:
         """All steps of a participant."""
         return self.protocol.steps(person.order)
 
-    def delete(self, pupil: Pupil) -> None:
-        """Delete everything about a participant but the number. Raises OSError; a study that goes on then finishes it."""
+    def erase(self, pupil: Pupil) -> None:
+        """Delete all files about a participant. Raises OSError; it may be called again, and a study that goes on finishes it.
+
+        Once it is done, `Roster.retire` keeps the number alone.
+        """
         self.people.pop(pupil.number, None)
+        self._delete_written()
         folder, leaving = self.folder(pupil), self.roster.folder / f"{WITHDRAWN}{pupil.number}"
-        if folder.is_dir():
-            folder.rename(leaving)
-        if leaving.is_dir():
-            rmtree(leaving)
-        for written in (TABLE, REPORT, HAND_OUTS):  # written anew when the study's server ends
+        for _ in range(2):  # what an erasure before this one has left, then the folder itself
+            if leaving.is_dir():
+                rmtree(leaving)
+            if folder.is_dir():
+                folder.rename(leaving)
+
+    def _delete_written(self) -> None:
+        """Delete the table and the pages, which are written anew when the study's server ends."""
+        for written in (TABLE, REPORT, HAND_OUTS):
             (self.roster.folder / written).unlink(missing_ok=True)
-        self.roster.retire(pupil.number)
 
 
 def inputs_of(lessons: Sequence[ClassLesson]) -> list[str]:
     """The SHA-256 of what each lesson is about: its world or task, and the files that these name."""
-    return [sha256_of(named_by(lesson)) for lesson in lessons]
+    return [sha256_of(_files_of(lesson).values()) for lesson in lessons]
+
+
+def _files_of(lesson: ClassLesson) -> dict[str, str]:
+    return named_files(lesson) if isinstance(lesson, LessonOptions) else {}
 
 
 def _changed(roster: Roster) -> str:
     """The first lesson's world or task that is not the one with which the study began, "" for none."""
     assert roster.study is not None
     known = zip(roster.lessons, inputs_of(roster.lessons), roster.study.inputs_sha256, strict=False)
-    return next((" of ".join(named_by(lesson)) for lesson, now, then in known if now != then), "")
+    return next((", ".join(_files_of(lesson).values()) for lesson, now, then in known if now != then), "")
 
 
 def _content(file: Path) -> bytes:

@@ -33,6 +33,7 @@ class StudyRoom(Room):
         self._limits: dict[int, tuple[int, asyncio.TimerHandle]] = {}  # number -> the limited step, and its alarm
         self._seen_s: dict[int, float] = {}  # number -> when a page last asked for the step
         self._fresh: set[int] = set()  # whose lesson has not been shown yet: its time begins then
+        self._former: dict[int, list[Desk]] = {}  # desks of earlier lessons, which may still draw
         self._begun = False
 
     def begin(self) -> None:
@@ -71,15 +72,19 @@ class StudyRoom(Room):
         if self.desks[page.number].state == "idle" and self.opens(pupil):
             self.seat(pupil)
         super().arrived(page)
+        self._lesson_seen(page.number, self.desks[page.number])
 
     def seat(self, pupil: Pupil) -> None:
         """Open the desk of a participant who is at a lesson; else it has no process."""
+        if (before := self.desks.get(pupil.number)) is not None:
+            self._former.setdefault(pupil.number, []).append(before)
         super().seat(pupil)
         self._lesson_seen(pupil.number, self.desks[pupil.number])
 
-    def _stirred(self, number: int, desk: Desk) -> None:
-        super()._stirred(number, desk)
-        self._lesson_seen(number, desk)
+    def _stirred(self, desk: Desk) -> None:
+        super()._stirred(desk)
+        for number in self.at_desk(desk):
+            self._lesson_seen(number, desk)
 
     def _lesson_seen(self, number: int, desk: Desk) -> None:
         """End the lesson's step when its last episode has ended, or who teaches it has; start its clock when its page is there.
@@ -92,7 +97,7 @@ class StudyRoom(Room):
         has_quit = desk.state == "stopped" and not desk.is_closed
         if has_quit or _is_taught(desk) or (desk.state == "over" and (desk.parts.get("ended") or not desk.is_there)):
             self._end_lesson(number, timed_out=False)
-        elif desk.state == "open" and number in self._fresh:
+        elif desk.state == "open" and number in self._fresh and number in self.pages:
             self._fresh.discard(number)
             person = self.study.people[number].with_step(replace(step, began=timestamp()))
             self._keep(person)
@@ -195,7 +200,7 @@ class StudyRoom(Room):
         if step.kind == "text":
             return shown | {"text": protocol.arm(step.arm or "").text}
         if step.kind == "lesson":
-            return shown | {"over": step.ended is not None, "timed_out": step.timed_out}
+            return shown | {"over": self._may_go_on(step, person.number), "timed_out": step.timed_out}
         asked = protocol.questionnaire(step.name)
         return shown | {"heading": asked.title, "text": asked.text, "items": [item.shown() for item in asked.asked]}
 
@@ -224,7 +229,11 @@ class StudyRoom(Room):
 
     def _is_stuck(self, number: int) -> bool:
         """Whether a lesson has failed, so that the participant may go on without it."""
-        return self.desks[number].state in STUCK
+        return number in self.desks and self.desks[number].state in STUCK
+
+    def _may_go_on(self, step: Step, number: int) -> bool:
+        """Whether the participant at a lesson's step may go on."""
+        return step.ended is not None or self._is_stuck(number)
 
     def _agreed(self, key: str) -> None:
         pupil = self.study.admit(key)
@@ -236,7 +245,7 @@ class StudyRoom(Room):
         step = person.step
         if step is None or at != len(person.steps):
             raise BadInput(f"You are at step {len(person.steps)}, not {at}.")
-        if step.kind == "lesson" and step.ended is None and not self._is_stuck(person.number):
+        if step.kind == "lesson" and not self._may_go_on(step, person.number):
             raise BadInput("This lesson is not over yet.")
         answers = {}
         if step.kind == "questionnaire":
@@ -258,7 +267,7 @@ class StudyRoom(Room):
         if step is not None and step.lesson is not None and step.kind == "lesson":
             self._fresh.add(number)
             with suppress(OSError):  # the record says where the participant is
-                self.roster.move(number, step.lesson - 1)
+                self.roster.move({number: step.lesson - 1})
             self.seat(self._pupil(number))
         elif number in self.desks:
             self._start(self.desks[number].close())
@@ -273,16 +282,19 @@ class StudyRoom(Room):
         pupil, person = self._pupil(number), self.study.people.pop(number)
         if number in self._limits:
             self._limits.pop(number)[1].cancel()
-        await self.desks[number].close()
+        desks = [self.desks[number], *self._former.pop(number, [])]
+        await asyncio.gather(*(desk.close() for desk in desks))
         try:
-            self.study.delete(pupil)
+            await asyncio.to_thread(self.study.erase, pupil)
+            self.roster.retire(number)
         except OSError:
             self.study.people[number] = person  # who may try again
+            self.seat(pupil)
+            if person.step is not None and person.step.kind == "lesson" and person.step.ended is None:
+                self._limit(number, person)
             raise
         del self.desks[number]
-        for page in [self.pages.get(number), *(page for page in self.shoulders if page.number == number)]:
-            if page is not None:
-                self._start(page.close(RELOAD))
+        self._close_pages(number, RELOAD)
         for known in (self._hints, self._asked, self._seen_s):
             known.pop(number, None)
         self._fresh.discard(number)
@@ -304,7 +316,8 @@ class StudyRoom(Room):
                 "step": len(person.steps),
                 "steps": len(self.study.planned(person)),
                 "here": step is not None and step.kind == "lesson",
-                "over": step is not None and (step.ended is not None or self._is_stuck(number)),
+                "over": step is not None and self._may_go_on(step, number),
+                "stuck": step is not None and step.ended is None and self._is_stuck(number),
                 "timed_out": step is not None and step.timed_out,
                 "left_s": None if limit_s is None or step is None else max(0.0, limit_s - seconds_since(step.began)),
             },
@@ -341,17 +354,20 @@ class StudyRoom(Room):
         super().help(number, begins)
 
     def go_on(self, number: int | None, lesson: int | None = None) -> None:
-        """End the step of a participant, whatever it is. Raises BadInput unless the protocol allows it."""
+        """End the step of a participant, whatever it is. Raises BadInput unless the protocol allows it, and OSError."""
         self._allow("next")
         if number is None or lesson is not None:
             raise BadInput("a study goes by its protocol: a participant goes on step by step")
-        person = self.study.people[self._pupil(number).number]
+        person = self.study.people.get(self._pupil(number).number)
+        if person is None:
+            raise BadInput(f"participant {number} is just withdrawing")
         if person.step is None:
             raise BadInput(f"{person.participant} has finished")
-        try:
-            self._advance(person.with_end())
-        except OSError as error:
-            raise BadInput(f"the study cannot be written: {error.strerror}") from None
+        self._advance(person.with_end())
+
+    def remove(self, number: int) -> None:
+        """Raises BadInput: a participant's data goes with the participant's own withdrawal, and stays without."""
+        raise BadInput("nobody is removed from a study: participants withdraw themselves")
 
     def tiles(self) -> dict[int, Json]:
         """The tile of each participant, by number, with the step and the arm."""

@@ -1,11 +1,10 @@
 // The teacher's page: a tile for each pupil, what the teacher does for all, and the table of what was taught.
 "use strict";
 
-const el = (id) => document.getElementById(id), { make } = classTile;
-const boxes = new Map(), SURE_MS = 3000;
-let END = "End the class";
+const el = (id) => document.getElementById(id), { make, twice } = classTile;
+const boxes = new Map();
 let study = null, turns = null; // its title, and what this page may do in it; of a run by hand its state and who operates
-let socket = null, paused = false, wall = false, isOpen = true, sure = 0;
+let socket = null, paused = false, wall = false, isOpen = true;
 
 // Everybody sees the address on a projector: its key goes into this window's memory
 if (location.search) {
@@ -38,7 +37,7 @@ function showClass(now) {
     el("title").textContent = document.title = study.title;
     el("pause").hidden = !study.may.includes("pause");
     el("to-lesson").hidden = el("all").hidden = true;
-    el("end").textContent = END = "End for now";
+    if (el("end").textContent === "End the class") el("end").textContent = "End for now";
   }
   turns = now.turns;
   if (turns) showTurns();
@@ -46,16 +45,18 @@ function showClass(now) {
   el("door").textContent = isOpen ? "Close the door" : "Open the door";
   el("door").setAttribute("aria-pressed", String(!isOpen));
   el("tried").hidden = !now.tried;
-  el("picture").src = now.picture;
-  el("address").textContent = now.join.replace(/\?.*/, "");
-  el("code").textContent = now.code;
-  const chosen = el("lesson").value;
-  el("lesson").replaceChildren(...now.lessons.map((lesson, k) => {
+}
+
+// How pupils join, and the lessons: the same as long as the class runs
+function showPlace({ picture, join, code, lessons }) {
+  el("picture").src = picture;
+  el("address").textContent = join.replace(/\?.*/, "");
+  el("code").textContent = code;
+  el("lesson").replaceChildren(...lessons.map((lesson, k) => {
     const made = make("option", `${k + 1}: ${lesson}`);
     made.value = k + 1;
     return made;
   }));
-  if (chosen) el("lesson").value = chosen;
 }
 
 // A run that the pupils operate in turns is the only lesson
@@ -120,8 +121,9 @@ function follow(pause = 300) {
   socket = new WebSocket(new URL(`frames${key}`, location.href.replace(/^http/, "ws")));
   socket.onopen = () => { pause = 300; };
   socket.onmessage = (event) => {
-    const { class: now, rows, tiles, teams, gone, refusal } = JSON.parse(event.data);
+    const { place, class: now, rows, tiles, teams, gone, refusal } = JSON.parse(event.data);
     el("told").textContent = refusal || "";
+    if (place) showPlace(place);
     if (now) showClass(now);
     if (rows) showRows(rows);
     if (teams) classTeams.show(teams);
@@ -138,7 +140,7 @@ function follow(pause = 300) {
 }
 
 el("begin").onclick = () => say({ do: "begin" });
-el("finish").onclick = () => say({ do: "finish" });
+twice(el("finish"), "Once more: finish it", () => say({ do: "finish" }));
 el("pause").onclick = () => say({ do: "pause", on: !paused });
 el("all").onclick = () => say({ do: "lesson", pupil: null, lesson: Number(el("lesson").value) });
 el("board").onclick = () => {
@@ -146,12 +148,7 @@ el("board").onclick = () => {
   document.body.classList.toggle("wall", wall);
   el("board").setAttribute("aria-pressed", String(wall));
 };
-el("end").onclick = () => {
-  if (performance.now() < sure) say({ do: "end" });
-  sure = performance.now() + SURE_MS;
-  el("end").textContent = "Once more: end it";
-  setTimeout(() => { el("end").textContent = END; }, SURE_MS);
-};
+twice(el("end"), "Once more: end it", () => say({ do: "end" }));
 el("door").onclick = () => say({ do: "door", open: !isOpen });
 for (const [id, file] of [["csv", "class.csv"], ["paper", "report.html"], ["handed", "hand-outs.html"]]) {
   el(id).onclick = () => { // a link shows its address to whoever sees the screen

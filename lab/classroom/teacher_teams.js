@@ -29,23 +29,23 @@ const classTeams = (() => {
     if (optimal) svg.append(drawn("line", { x1: EDGE, y1: y(optimal), x2: WIDE - EDGE, y2: y(optimal), class: "best" }), drawn("text", { x: EDGE + 4, y: y(optimal) + 13 }, `fewest possible: ${optimal}`));
     for (const team of teams.filter((one) => one.curve.length > 1)) {
       const points = team.curve.map((value, k) => `${x(k / (team.curve.length - 1), team).toFixed(1)},${y(value).toFixed(1)}`);
-      svg.append(drawn("polyline", { points: points.join(" "), stroke: colour(team.team), "stroke-dasharray": DASHES[Math.floor((team.team - 1) / COLOURS.length) % DASHES.length] }));
+      svg.append(drawn("polyline", { points: points.join(" "), stroke: colour(team.number), "stroke-dasharray": DASHES[Math.floor((team.number - 1) / COLOURS.length) % DASHES.length] }));
       const [at, height] = points[points.length - 1].split(",").map(Number);
       let beside = Math.min(height + 4, y(0) - 2);
       while (placed.some((other) => Math.abs(other - beside) < 14)) beside -= 14; // names of curves that end together
       placed.push(beside);
       svg.append(drawn("text", { x: at + 5, y: beside, class: "name" }, team.name));
-      svg.lastChild.style.fill = colour(team.team);
+      svg.lastChild.style.fill = colour(team.number);
     }
     return svg;
   }
 
   // Who is ahead among the teams at one lesson: the least steps, and who had them first
   function ahead(teams) {
-    const [first] = teams.filter((team) => team.best).sort((a, b) => a.best[0] - b.best[0] || a.best[1] - b.best[1]);
+    const [first] = teams.filter((team) => team.best !== null).sort((a, b) => a.best - b.best || a.best_at - b.best_at);
     if (!first) return "";
-    const shortest = first.optimal !== null && first.best[0] <= first.optimal;
-    return `${first.name} is ahead: ${shortest ? "the shortest path" : "its best episode"} has ${first.best[0]} steps, in episode ${first.best[1]} for the first time.`;
+    const shortest = first.optimal !== null && first.best <= first.optimal;
+    return `${first.name} is ahead: ${shortest ? "the shortest path" : "its best episode"} has ${first.best} steps, in episode ${first.best_at} for the first time.`;
   }
 
   function bar({ trust, low, high }) {
@@ -67,7 +67,7 @@ const classTeams = (() => {
 
   function card(team) {
     const made = make("section", "", "team"), known = new Map(team.board.map((one) => [one.name, one]));
-    made.style.borderColor = colour(team.team);
+    made.style.borderColor = colour(team.number);
     const facts = `${team.title || `lesson ${team.lesson}`}: ${STATES[team.state]}; episode ${team.episode}${team.episodes ? ` of ${team.episodes}` : ""}, ${team.taken} answers followed`;
     const list = make("ul", "");
     list.append(...team.pupils.map((name) => member(name, known.get(name))));

@@ -60,6 +60,22 @@ const classTile = (() => {
     return [VERDICTS[tile.verdict] || "works alone", tile.verdict === "rejected" ? "dropped" : ""];
   }
 
+  // What cannot be undone takes a second click within some seconds
+  function twice(made, again, act) {
+    let sure = 0;
+    made.onclick = () => {
+      const text = made.textContent;
+      if (performance.now() < sure) {
+        sure = 0;
+        act();
+        return;
+      }
+      sure = performance.now() + SURE_MS;
+      made.textContent = again;
+      setTimeout(() => { if (made.textContent === again) made.textContent = text; }, SURE_MS);
+    };
+  }
+
   // An empty tile, whose buttons stay the same while what it says changes; act: what they do, by name
   function create(act) {
     const box = make("article", undefined, "tile"), head = make("h2"), says = make("p", "", "says"), facts = make("p"), hint = make("p", "", "hint"), row = make("p", undefined, "row");
@@ -83,13 +99,8 @@ const classTile = (() => {
     });
     const look = button("Look", "over the shoulder, live; while you help you answer there", () => act.look(parts.tile));
     parts.turn = button("Your turn", "let this pupil operate now", () => act.turn(parts.tile));
-    let sure = 0;
-    const remove = button("Remove", "take this seat away, for good", () => {
-      if (performance.now() < sure) act.remove(parts.tile);
-      sure = performance.now() + SURE_MS;
-      remove.textContent = "Once more: remove";
-      setTimeout(() => { remove.textContent = "Remove"; }, SURE_MS);
-    });
+    const remove = button("Remove", "take this seat away, for good", () => {});
+    twice(remove, "Once more: remove", () => act.remove(parts.tile));
     head.append(name, here);
     Object.assign(parts, { hints: ask, next: button("Next", "to the next lesson", () => act.next(parts.tile)), remove });
     row.append(look, parts.turn, parts.help, ask, parts.next, remove, parts.open);
@@ -122,5 +133,5 @@ const classTile = (() => {
     parts.open.hidden = !["failed", "stopped", "lost"].includes(tile.state);
   }
 
-  return { create, draw, make };
+  return { create, draw, make, twice };
 })();

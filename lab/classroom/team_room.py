@@ -5,9 +5,9 @@ from dataclasses import replace
 from lab.advice.entries import FILE, is_unbegun
 from lab.classroom.desk import Desk
 from lab.classroom.desk_process import DeskOrder
-from lab.classroom.room import RELOAD, Json, Room
+from lab.classroom.room import Json, Room
 from lab.classroom.roster import Pupil, Roster
-from lab.classroom.tile import thinned
+from lab.classroom.tile import tile_of
 from lab.errors import BadInput
 from lab.files import is_file
 
@@ -21,14 +21,14 @@ class TeamRoom(Room):
     def __init__(self, roster: Roster) -> None:
         super().__init__(roster)
         self._teams: dict[int, Desk] = {}
-        self._begun: set[int] = set()  # teams
 
     # ---- desks
 
     def seat(self, pupil: Pupil) -> None:
         """Give a pupil a place at the team's desk, which is opened if the team's lesson has begun."""
         if pupil.team not in self._teams:
-            self._open(pupil.team)
+            journal = self.order(self._learner(pupil.team)).folder / FILE
+            self._open(pupil.team, begins=is_file(journal) and not is_unbegun(journal))
             return
         desk = self._teams[pupil.team]
         if desk.state == "idle":  # its lesson has not begun: the pupil will be one of those with whom it does
@@ -54,24 +54,10 @@ class TeamRoom(Room):
     def _learner(self, team: int) -> Pupil:
         return next(learner for learner in self.roster.learners if learner.number == team)
 
-    def _open(self, team: int) -> None:
-        """Open the desk of a team at its lesson, for all of its pupils."""
-        pupils, before = self.roster.members(team), self._teams.get(team)
-        desk = self._teams[team] = Desk(self.order(self._learner(team)))
-        self.desks |= dict.fromkeys([pupil.number for pupil in pupils], desk)
-        desk.on_news = lambda: self._stirred(pupils[0].number, desk)
-        journal = desk.order.folder / FILE
-        if is_file(journal) and not is_unbegun(journal):
-            self._begun.add(team)
-        self._place(desk, before, team in self._begun)
-        for pupil in pupils if before is not None else ():
-            self._asked.pop(pupil.number, None)
-            if page := self.pages.get(pupil.number):
-                self._start(page.close(RELOAD))
-
-    def _pose(self, number: int, desk: Desk) -> None:
-        for pupil in self.roster.members(self.roster.pupils[number - 1].team):
-            super()._pose(pupil.number, desk)
+    def _open(self, team: int, begins: bool = True) -> None:
+        """Open the desk of a team at its lesson, for all of its pupils; begins: whether it gets a process."""
+        order, pupils = self.order(self._learner(team)), self.roster.members(team)
+        self._teams[team] = self._share(order, pupils, self._teams.get(team), begins)
 
     # ---- pupils' pages
 
@@ -110,7 +96,6 @@ class TeamRoom(Room):
         if not waiting:
             raise BadInput("no team waits" if self._teams else "nobody has joined yet")
         for team in waiting:
-            self._begun.add(team)
             self._open(team)
 
     def go_on(self, number: int | None, lesson: int | None = None) -> None:
@@ -119,17 +104,10 @@ class TeamRoom(Room):
         It begins at once, with all pupils of the team. Raises BadInput for a pupil or lesson that there is not.
         """
         teams = [*self._teams] if number is None else [self._pupil(number).team]
-        for team in teams:
-            learner = self._learner(team)
-            wanted = learner.lesson + 1 if lesson is None else lesson
-            if wanted == learner.lesson or (number is None and wanted >= len(self.roster.lessons)):
-                continue
-            self._finished.pop((team, learner.lesson), None)
-            for pupil in self.roster.members(team):
-                self.roster.move(pupil.number, wanted)
-                self._hints.pop(pupil.number, None)
-                self._helped.discard(pupil.number)
-            self._begun.add(team)
+        wanted = {team: self._to_lesson(self._learner(team), number is None, lesson) for team in teams}
+        moved = {team: to for team, to in wanted.items() if to is not None}
+        self._move({pupil.number: to for team, to in moved.items() for pupil in self.roster.members(team)})
+        for team in moved:
             self._open(team)
 
     def open_again(self, number: int) -> None:
@@ -144,43 +122,15 @@ class TeamRoom(Room):
         team = self.roster.pupils[number - 1].team
         if not self.roster.members(team):
             self._start(self._teams.pop(team).close())
-            self._begun.discard(team)
 
     # ---- what the teacher sees
 
-    def tiles(self) -> dict[int, Json]:
-        """The tile of each pupil, by number."""
-        tiles = super().tiles()
-        for number, tile in tiles.items():
-            tile |= {"team": self.roster.pupils[number - 1].team, "late": self._is_late(number)}
-        return tiles
-
     def teams(self) -> list[Json]:
-        """Of each team: its lesson, curve and result, and how far its learner trusts each pupil."""
+        """Of each team: what a tile has, its pupils, and how far its learner trusts each of them."""
         return [self._team(learner) for learner in self.roster.learners]
-
-    def standing(self) -> dict[int, Json]:
-        """Lesson, state and text of each team, by number."""
-        return {team["team"]: team | {"text": self._teams[team["team"]].text} for team in self.teams()}
 
     def _team(self, learner: Pupil) -> Json:
         desk = self._teams[learner.number]
-        lesson, curve = desk.parts.get("lesson") or {}, desk.parts.get("curve") or {}
-        standing = desk.parts.get("standing") or {}
-        return {
-            "team": learner.number,
-            "name": learner.name,
-            "pupils": [pupil.name for pupil in self.roster.members(learner.number)],
-            "lesson": learner.lesson + 1,
-            "title": lesson.get("title", ""),
-            "state": desk.state,
-            "episode": curve.get("count", 0),
-            "episodes": lesson.get("episodes", 0),
-            "optimal": lesson.get("optimal"),
-            "curve": thinned(curve.get("means", [])),
-            "best": curve.get("best"),
-            "taken": standing.get("taken", 0),
-            "verdict": standing.get("verdict", ""),
-            "solved": None if desk.result is None else bool(desk.result["solved"]),
-            "board": desk.parts.get("members") or [],
-        }
+        pupils = [pupil.name for pupil in self.roster.members(learner.number)]
+        board = desk.parts.get("members") or []
+        return tile_of(learner, desk, None, False, None) | {"pupils": pupils, "board": board}

@@ -1,6 +1,7 @@
 """What the teacher sees of a pupil: a tile on the page, and a row of the table at the end."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass, fields
 from typing import Any
 
 from lab.classroom.desk import Desk
@@ -9,21 +10,51 @@ from lab.classroom.roster import Pupil
 Json = dict[str, Any]
 TABLE, REPORT, HAND_OUTS = "class.csv", "report.html", "hand-outs.html"  # the rows and the pages, in the class's folder
 MOST_POINTS = 60  # of a tile's curve
-COLUMNS = (
-    *("pupil", "name", "lesson", "skill", "state", "episodes", "solved", "final_steps", "optimal_steps"),
-    *("answers", "own_choice_too", "not_best", "helped_steps", "guided_episodes", "misleads", "believed", "tau"),
-    *("cost", "optimal_cost", "objective"),  # of a lesson on an order
-)
+Number = int | float | None
+
+
+@dataclass(frozen=True)
+class Row:
+    """The row of a finished lesson; what is not known, or does not apply, is None.
+
+    final_steps, optimal_steps: of a table; cost, optimal_cost, objective: of an order. believed: whether the learner did not
+    reject the advice, None if nothing was advised.
+    """
+
+    pupil: int
+    name: str
+    lesson: int
+    skill: str
+    state: str
+    episodes: int
+    solved: bool
+    final_steps: Number
+    optimal_steps: Number
+    answers: int | None
+    own_choice_too: int | None
+    not_best: int | None
+    helped_steps: int | None
+    guided_episodes: int | None
+    misleads: int | None
+    believed: bool | None
+    tau: Number
+    cost: Number
+    optimal_cost: Number
+    objective: str | None
+
+
+COLUMNS = tuple(column.name for column in fields(Row))
 
 
 def tile_of(pupil: Pupil, desk: Desk, question: Json | None, here: bool, asked_s: float | None) -> Json:
-    """The tile of a pupil.
+    """The tile of a pupil; best, best_at: the least cost of an episode, and the first one that has it.
 
     question: the one that waits for the pupil, asked_s: how long [s] it has waited, None for none; here: whether the pupil's page
     is open.
     """
     lesson, standing = desk.parts.get("lesson") or {}, desk.parts.get("standing") or {}
     curve = desk.parts.get("curve") or {}
+    best, best_at = curve.get("best") or (None, None)
     return {
         "number": pupil.number,
         "name": pupil.name,
@@ -37,7 +68,8 @@ def tile_of(pupil: Pupil, desk: Desk, question: Json | None, here: bool, asked_s
         "kind": lesson.get("kind", "steps"),
         "optimal": lesson.get("optimal"),
         "proven": lesson.get("proven", True),
-        "best": (curve.get("best") or [None])[0],
+        "best": best,
+        "best_at": best_at,
         "curve": thinned(curve.get("means", [])),
         "guided": thinned(curve.get("guided", [])),
         "asks": question["title"] if question else "",
@@ -70,7 +102,7 @@ def row_of(pupil: Pupil, lesson: int, result: Mapping[str, Any]) -> Json:
         "helped_steps": advice.get("helped_steps"),
         "guided_episodes": receipt.get("guided") if is_order(result) else len(result["guided_episodes"]),
         "misleads": advice.get("misleads"),
-        "believed": advice.get("rejected_at_episode") is None,
+        "believed": advice.get("rejected_at_episode") is None if receipt.get("taken", 1) else None,
         "tau": skill.get("tau"),
     }
     own = ("cost", "optimal_cost", "objective") if is_order(result) else ("final_steps", "optimal_steps")

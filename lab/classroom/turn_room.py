@@ -8,7 +8,7 @@ from contextlib import suppress
 from lab.classroom.desk import Desk
 from lab.classroom.desk_process import DeskOrder
 from lab.classroom.door import Often
-from lab.classroom.room import RELOAD, Json, PupilPage, Room
+from lab.classroom.room import Json, PupilPage, Room
 from lab.classroom.roster import Pupil, Roster
 from lab.classroom.turn_record import RUN, counted_commands, keep_command, rows_of_run
 from lab.errors import BadInput
@@ -19,6 +19,7 @@ from lab.view.summary import delivered_in_words
 
 # commands of a pupil that are passed on in so many seconds: a journal holds all of them
 MOST_COMMANDS, COMMANDS_S = 100, 10.0
+STOP_EVERY_S = 0.25  # least time between two emergency stops of a pupil who gives too many commands
 AWAY_S = 20.0  # after which the turn of a pupil whose page is closed passes on
 HAND_OVER = '{"class":"hand over"}'  # as it comes from the class's own part of a pupil's page
 
@@ -38,11 +39,13 @@ class TurnRoom(Room):
         # that pass the turn on: when its "time" is up, its pupil is "away"
         self._alarms: dict[str, asyncio.TimerHandle] = {}
         self._often: dict[int, Often] = {}  # how often a pupil has given commands lately
+        self._stopped_s: dict[int, float] = {}  # when such a pupil's last emergency stop was passed on
         self._folder = roster.folder / RUN
         self._commands = counted_commands(self._folder)
 
     async def end(self) -> None:
         """Close the desk: the run can be resumed."""
+        self.ended.set()
         self._disarm()
         if self._desk is not None:
             await self._desk.close()
@@ -68,17 +71,11 @@ class TurnRoom(Room):
 
     def _open(self, begins: bool) -> None:
         """Open the desk, for all pupils; begins: whether it gets a process."""
-        before, pupils = self._desk, self.roster.present
-        desk = self._desk = Desk(self.order(pupils[0]))
-        self.desks |= dict.fromkeys([pupil.number for pupil in pupils], desk)
-        desk.on_news = lambda: self._stirred(next(iter(self.desks), 0), desk)
-        self._place(desk, before, begins)
-        if before is not None:
-            for page in self.pages.values():
-                self._start(page.close(RELOAD))
+        pupils = self.roster.present
+        self._desk = self._share(self.order(pupils[0]), pupils, self._desk, begins)
 
-    def _stirred(self, number: int, desk: Desk) -> None:
-        super()._stirred(number, desk)
+    def _stirred(self, desk: Desk) -> None:
+        super()._stirred(desk)
         if desk is not self._desk:
             return
         if desk.state == "over" and self._turn is not None:
@@ -204,8 +201,10 @@ class TurnRoom(Room):
             return False
         if isinstance(meant, PageCommand) and self._is_open:
             often, now_s = self._often.setdefault(page.number, Often(MOST_COMMANDS, COMMANDS_S)), time.monotonic()
-            if often.is_full(now_s) and is_stop:
-                return True  # an emergency stop is never too much
+            if often.is_full(now_s) and is_stop:  # it always works; what comes within its time is the same stop
+                is_new = now_s - self._stopped_s.get(page.number, -STOP_EVERY_S) >= STOP_EVERY_S
+                self._stopped_s[page.number] = now_s if is_new else self._stopped_s[page.number]
+                return is_new
             if often.is_full(now_s):
                 await page.send(json.dumps({"refusal": "Too many commands within seconds: wait a moment."}))
                 return False

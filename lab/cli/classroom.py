@@ -1,5 +1,6 @@
 """`lab class`: many pupils teach in their browsers, and one teacher looks on and helps."""
 
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -59,15 +60,15 @@ def hold_class(
         ),
     ] = 0,
     turn: Annotated[
-        float,
+        float | None,
         typer.Option(
             "--turn",
             metavar="SECONDS",
             min=0.0,
             max=3600.0,
-            help="Length of a turn at operate:TASK; 0: until it is handed over.",
+            help="Length of a turn at operate:TASK; 0, the default: until it is handed over.",
         ),
-    ] = 0.0,
+    ] = None,
     typed_names: Annotated[
         bool, typer.Option("--typed-names", help="Pupils type their names; by default each is given a pseudonym.")
     ] = False,
@@ -105,42 +106,50 @@ def hold_class(
     Pupils open the printed address and type the code. Their learners go on where they stopped: after a closed lid, a killed
     server, and with --resume.
     """
+    given = {
+        "LESSON": bool(lessons),
+        "--out": out is not None,
+        "--typed-names": typed_names,
+        "--task": task is not None,
+        "--learner": learner is not None,
+        "--gate": gate is not None,
+        "--episodes": episodes is not None,
+        "--seed": seed != 0,
+        "--pupils": pupils != SEATS,
+        "--teams": teams != 0,
+        "--turn": turn is not None,
+        "--times": times,
+        "--study": study is not None,
+        "--resume": resume is not None,
+    }
     if report is not None:
-        if lessons or out is not None or resume is not None:
-            raise BadInput(
-                f"--report {report} beside lessons, --out or --resume: it is written of a class that is there, and none is held"
-            )
+        _refuse(given, f"--report {report}", "it is written of a class that is there, and none is held")
         show(deferred.write_report(deferred.Roster.read(report, "--report")), as_json, _report_summary)
         return
     held = None
     if resume is not None:
-        if lessons or out is not None or study is not None:
-            raise BadInput(
-                f"--resume {resume} beside lessons, --study or --out: a class goes on with its own lessons in its own folder"
-            )
+        why = "a class goes on in its own folder, with its own lessons, options and seats"
+        _refuse(given, f"--resume {resume}", why, allowed=("--resume", "--turn", "--times"))
         roster = deferred.Roster.read(resume)
         roster.modules = tuple(trust_module or ())
-        roster.turn_s = _checked_turn(turn, roster) or roster.turn_s
+        if turn is not None:
+            roster.turn_s = _checked_turn(turn, roster)
         held = None if roster.study is None else deferred.StudyWithPeople.read(roster)
     elif study is not None:
-        given = {
-            "LESSON": lessons,
-            "--typed-names": typed_names,
-            "--task": task,
-            "--learner": learner,
-            "--gate": gate,
-            "--episodes": episodes,
-            "--seed": seed,
-            "--pupils": pupils != SEATS,
-            "--teams": teams,
-            "--turn": turn,
-        }
-        held = _study(study, out, tuple(trust_module or ()), [name for name, value in given.items() if value])
+        if typed_names:
+            raise BadInput(
+                f"--typed-names beside --study {study}: participants have ids or pseudonyms, and never names"
+            )
+        why = "lessons, options, seed and seats of a study are in its protocol"
+        _refuse(given, f"--study {study}", why, allowed=("--out", "--study", "--times"))
+        held = _study(study, out, tuple(trust_module or ()))
         roster = held.roster
     else:
         roster = _new(lessons or [], out, pupils, typed_names, seed, (task, learner, gate, episodes))
-        roster.teams, roster.turn_s = _checked_teams(teams, roster), _checked_turn(turn, roster)
+        roster.teams, roster.turn_s = _checked_teams(teams, roster), _checked_turn(turn or 0.0, roster)
         roster.modules = tuple(filter(None, map(deferred.module_of, roster.lessons)))
+    if times and deferred.is_operation(roster.lessons):
+        raise BadInput("--times with a run by hand: nobody is asked anything, so there are no answers with times")
     roster.times = roster.times or times
     _check(roster)
     place = deferred.place_of(lan, name or (), certificate, key)
@@ -188,14 +197,15 @@ def _new(
     return deferred.Roster.new(out, wanted, seed, pupils, typed_names)
 
 
-def _study(file: Path, out: Path | None, modules: tuple[str, ...], beside: list[str]) -> "deferred.StudyWithPeople":
-    """A new study. Raises BadInput, also for options that its protocol has, and for typed names, which it never has."""
-    if "--typed-names" in beside:
-        raise BadInput(f"--typed-names beside --study {file}: participants have ids or pseudonyms, and never names")
-    if beside:
-        raise BadInput(
-            f"{beside[0]} beside --study {file}: lessons, options, seed and seats of a study are in its protocol"
-        )
+def _refuse(given: Mapping[str, bool], beside: str, why: str, allowed: Collection[str] = ()) -> None:
+    """Raises BadInput for the first option that was given and is not allowed beside another one."""
+    for option, is_given in given.items():
+        if is_given and option not in allowed:
+            raise BadInput(f"{option} beside {beside}: {why}")
+
+
+def _study(file: Path, out: Path | None, modules: tuple[str, ...]) -> "deferred.StudyWithPeople":
+    """A new study. Raises BadInput for what is wrong in its protocol, and without a folder."""
     if out is None:
         raise BadInput("--out is missing: the folder in which the study is kept, such as --out who-asks")
     held = deferred.StudyWithPeople.new(file, out, lambda lesson: _check_lesson(lesson, str(file), modules))

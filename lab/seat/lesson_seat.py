@@ -186,7 +186,8 @@ class LessonSeat:
     def lesson_over(self, document: Mapping[str, Any]) -> None:
         """The lesson, or its replay, is over: show the final receipt on the page."""
         for page in self._pages:
-            page.receipt(document["receipt"])
+            if (worth := document.get("receipt")) is not None:
+                page.receipt(worth)
             page.finished(LESSON_OVER)
 
     # ---- questions

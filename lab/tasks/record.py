@@ -163,8 +163,10 @@ def read_text(path: Path) -> str:
 def first_fault(error: ValidationError) -> str:
     """The first fault that a validation found, with its place and the bad value: "port = 'x': Input should be ..."."""
     first = error.errors(include_url=False)[0]
-    value = "" if first["type"] == "missing" else f" = {shortened(repr(first['input']))}"
-    return f"{'.'.join(map(str, first['loc']))}{value}: {first['msg']}"
+    value = f" = {shortened(repr(first['input']))}"
+    if first["type"] in ("missing", "value_error"):  # there is none; the message of a check of our own names it
+        value = ""
+    return f"{'.'.join(map(str, first['loc']))}{value}: {first['msg'].removeprefix('Value error, ')}"
 
 
 def read_json(path: Path, kind: type[Kept], which: str, wanted: str, most_bytes: int = MAX_FILE_BYTES) -> Kept:

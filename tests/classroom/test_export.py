@@ -128,7 +128,7 @@ def test_parquet_holds_the_same_rows_with_types(tmp_path: Path) -> None:
         ("class.json", "{}", "class.json' (DIR): format: "),
         ("class.json", None, "holds no class"),
         ("01-silver-deer/participant.json", '{"format": "x"}', "participant.json': format = 'x': "),
-        ("01-silver-deer/participant.json", PERSON.replace("T19:01", "T99:01"), "participant.json': steps.0.began = "),
+        ("01-silver-deer/participant.json", PERSON.replace("T19:01", "T99:01"), "participant.json': steps.0.began: "),
         ("01-silver-deer/participant.json", PERSON.replace('"x"', "NaN"), "participant.json': steps.0.answers."),
         ("01-silver-deer/lesson-1/receipt.json", "{", "receipt.json': "),
         ("01-silver-deer/lesson-1/times.jsonl", "{}\n", "times.jsonl': line 1: "),

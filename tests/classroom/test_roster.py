@@ -1,13 +1,16 @@
 """The roster of a class: who joins, by which name, and what is kept of it."""
 
+import errno
 import json
 import stat
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from lab.classroom import roster as roster_module
 from lab.classroom.roster import FILE, LETTERS, NAME_LENGTH, Full, Pupil, Roster, StudyEntry, clean_name, hash_of
 from lab.errors import BadInput
 from lab.operating_system import WINDOWS
@@ -81,11 +84,35 @@ def test_a_full_class_takes_nobody(tmp_path: Path, lesson: LessonOptions) -> Non
 def test_a_pupil_goes_on_to_a_lesson_that_there_is(tmp_path: Path, lesson: LessonOptions) -> None:
     made = roster(tmp_path / "a", lesson)
     joined(made)
-    assert made.move(1, 1).lesson == 1
+    made.move({1: 1})
     assert Roster.read(tmp_path / "a").pupils[0].lesson == 1
     for number, wrong in ((1, 2), (1, -1), (2, 0), (0, 0)):
         with pytest.raises(BadInput):
-            made.move(number, wrong)
+            made.move({number: wrong})
+
+
+def test_what_cannot_be_written_has_not_happened(
+    tmp_path: Path, lesson: LessonOptions, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = Roster.new(tmp_path / "a", [lesson, lesson], 0, 3, False)
+    made.study = StudyEntry("0" * 64)
+    made.admit("key", "P01")
+    before = replace(made, pupils=[*made.pupils])
+
+    def full(path: Path, content: bytes) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(roster_module, "write_whole", full)
+    for change in (
+        lambda: made.join(made.code),
+        lambda: made.admit("another", "P02"),
+        lambda: made.move({1: 1}),
+        lambda: made.remove(1),
+        lambda: made.retire(1),
+    ):
+        with pytest.raises(OSError, match="No space"):
+            change()
+        assert made == before
 
 
 def test_a_removed_pupil_has_no_key_and_leaves_the_name_to_another_one(tmp_path: Path, lesson: LessonOptions) -> None:

@@ -19,6 +19,7 @@ from lab.classroom.holding import closing
 from lab.classroom.participant import Participant
 from lab.classroom.roster import Pupil, Roster
 from lab.classroom.study import PROTOCOL, Study
+from lab.classroom.study_room import StudyRoom
 from lab.errors import BadInput
 from tests.classroom.conftest import asked, at_page, question, seated, until
 from tests.classroom.scripted import LAST, TLX, Scripted, served, study_in
@@ -83,11 +84,45 @@ def test_participants_go_through_all_arms_and_one_withdraws(server: ClassServer)
 def test_a_study_with_a_withdrawal_ends_and_goes_on_without_a_trace(server: ClassServer) -> None:
     first, second = Scripted.agreed(server), Scripted.agreed(server)
     first.says(do="withdraw")
-    document = closing(server)  # as at the end of the class: table, report and hand-outs are written
+    document = closing(server)  # the server has ended: table, report and hand-outs are written
     assert [pupil["name"] for pupil in document["pupils"]] == ["P02"]
     assert not (server.roster.folder / "01-P01").exists()
-    second.says(do="withdraw")
-    assert not any(b"P02" in content or "P02" in name for name, content in files(server).items())
+    with served(Study.read(Roster.read(server.roster.folder))) as again:
+        Scripted(again, second.page).says(do="withdraw")
+        assert not any(b"P02" in content or "P02" in name for name, content in files(server).items())
+
+
+def test_nothing_comes_back_of_lessons_that_were_just_taught(tmp_path: Path) -> None:
+    """The desks of two lessons may still draw their pictures when the participant withdraws."""
+    text = 'lessons = ["small.txt"]\ngate = "always"\nepisodes = 2\n\n[[arms]]\nname = "b"'
+    with served(study_in(tmp_path, **{text: text.replace('"small.txt"]', '"small.txt", "small.txt"]')})) as server:
+        person = Scripted.agreed(server)
+        while (shown := person.goes_through("lesson"))["kind"] == "lesson":
+            taught = person.arm() == "a" and person.lesson()
+            if taught and person.kept()["steps"][-1]["lesson"] == 2:
+                break
+            person.goes_on(shown) if taught else person.lesson() and person.goes_on(shown)
+        person.says(do="withdraw")
+        server.stop()  # whatever still ran has ended
+        assert not (server.roster.folder / "01-P01").exists()
+
+
+def test_whoever_leads_a_study_removes_nobody(server: ClassServer) -> None:
+    Scripted.agreed(server)
+    with pytest.raises(BadInput, match="withdraw themselves"):
+        server.call(lambda: server.room.remove(1))
+    assert [pupil.name for pupil in server.roster.present] == ["P01"]
+
+
+def test_the_time_of_a_lesson_begins_with_its_page(tmp_path: Path) -> None:
+    with served(study_in(tmp_path)) as server:
+        person = Scripted.agreed(server)
+        while person.goes_through("lesson")["kind"] == "lesson" and person.arm() != "c":
+            person.lesson()
+            person.goes_on(person.state())
+        number = server.roster.present[0].number
+        assert server.call(lambda: isinstance(server.room, StudyRoom) and number not in server.room._limits)
+        assert person.lesson(answers=False)["timed_out"]  # its limit is one second
 
 
 def test_who_ends_a_lesson_has_ended_it_also_after_the_server(server: ClassServer) -> None:

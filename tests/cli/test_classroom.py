@@ -33,7 +33,7 @@ EXAMPLE = Path(__file__).parents[2] / "examples" / "study_with_people.toml"
         (["world-1", "--turn", "60", "--out", "x"], "--turn 60"),
         (["--resume", "y"], "holds no class"),
         (["--report", "y"], "(--report) holds no class"),
-        (["world-1", "--report", "y"], "--report y beside"),
+        (["world-1", "--report", "y"], "beside --report y"),
         (["world-1", "--out", "x", "--pupils", "0"], "--pupils"),
         (["world-1", "--out", "x", "--gate", "ccr"], "ccr"),
         (["order:nothing", "--out", "x"], "nothing"),
