@@ -243,6 +243,7 @@ def write_report(roster: Roster, rows: Sequence[Json] | None = None) -> Json:
         "class": str(roster.folder),
         "lessons": [name_of(lesson) for lesson in roster.lessons],
         "seed": roster.seed,
+        "teams": roster.teams,
         "pupils": [
             {
                 "number": pupil.number,

@@ -42,10 +42,12 @@ const classTeams = (() => {
 
   // Who is ahead among the teams at one lesson: the least steps, and who had them first
   function ahead(teams) {
-    const [first] = teams.filter((team) => team.best !== null).sort((a, b) => a.best - b.best || a.best_at - b.best_at);
+    const [first, ...others] = teams.filter((team) => team.best !== null).sort((a, b) => a.best - b.best || a.best_at - b.best_at);
     if (!first) return "";
     const shortest = first.optimal !== null && first.best <= first.optimal;
-    return `${first.name} is ahead: ${shortest ? "the shortest path" : "its best episode"} has ${first.best} steps, in episode ${first.best_at} for the first time.`;
+    const level = others.filter((team) => team.best === first.best && team.best_at === first.best_at);
+    const names = [first, ...level].map((team) => team.name).join(" and ");
+    return `${names} ${level.length ? "are" : "is"} ahead: ${shortest ? "the shortest path" : "its best episode"} has ${first.best} steps, in episode ${first.best_at} for the first time.`;
   }
 
   function bar({ trust, low, high }) {

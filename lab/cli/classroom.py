@@ -248,16 +248,18 @@ def _check_lesson(lesson: "deferred.ClassLesson", where: str, modules: tuple[str
     deferred.check_lesson(lesson)
 
 
-def _report_summary(document: dict[str, Any]) -> Any:
+def _report_summary(document: dict[str, Any]) -> str:
     files = document["files"]
-    over = counted(len(document["rows"]), "lesson")
-    return f"{over} taught; report: {files['report']}; hand-outs: {files['hand_outs']}; table: {files['table']}"
+    return f"{_taught(document)}; table: {files['table']}; report: {files['report']}; hand-outs: {files['hand_outs']}"
 
 
-def _summary(document: dict[str, Any]) -> Any:
-    over = len(document["rows"])
-    return (
-        f"{counted(len(document['pupils']), 'pupil')}, {counted(over, 'lesson')} taught; table: {document['files']['table']}; "
-        f"report: {document['files']['report']}; hand-outs: {document['files']['hand_outs']}; "
-        f"go on with: lab class --resume {document['class']}"
-    )
+def _summary(document: dict[str, Any]) -> str:
+    return f"{_report_summary(document)}; go on with: lab class --resume {document['class']}"
+
+
+def _taught(document: dict[str, Any]) -> str:
+    """What was done in a class, in words."""
+    rows, there = document["rows"], counted(len(document["pupils"]), "team" if document["teams"] else "pupil")
+    if rows and "delivered" in rows[0]:
+        return f"{there}; {rows[0]['delivered']} of {rows[0]['parts']} parts delivered in the run"
+    return f"{there}, {counted(len(rows), 'lesson')} taught"
