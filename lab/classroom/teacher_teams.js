@@ -47,7 +47,7 @@ const classTeams = (() => {
     const shortest = first.optimal !== null && first.best <= first.optimal;
     const level = others.filter((team) => team.best === first.best && team.best_at === first.best_at);
     const names = [first, ...level].map((team) => team.name).join(" and ");
-    return `${names} ${level.length ? "are" : "is"} ahead: ${shortest ? "the shortest path" : "its best episode"} has ${first.best} steps, in episode ${first.best_at} for the first time.`;
+    return `${names} ${!level.length ? "is ahead" : level.length === teams.length - 1 ? "are level" : "are ahead"}: ${shortest ? "the shortest path" : "the best episode"} has ${first.best} steps, in episode ${first.best_at} for the first time.`;
   }
 
   function bar({ trust, low, high }) {
