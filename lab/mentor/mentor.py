@@ -48,10 +48,12 @@ class Mentor:
     `calibrate` sets it. promise: what that promises. judge: counts the takeovers that helped, once `corrected` is told.
 
         >>> import lab, numpy as np
-        >>> line = np.linspace(0, 1, 20, dtype=np.float32)[:, None]
-        >>> right = lab.Episode("go right", line, np.ones_like(line), np.zeros(20, bool), success=True)
-        >>> mentor = lab.Mentor.learn(lab.Recording(10, "cart", ("x",), ("speed",), [right] * 9), "distance")
-        >>> mentor.calibrate([right] * 9, false_alarms=0.1).promise.kind
+        >>> def right(start):
+        ...     places = np.linspace(start, start + 1, 21, dtype=np.float32)[:, None]
+        ...     return lab.Episode("go right", places, np.ones_like(places), np.zeros(21, bool), success=True)
+        >>> shown, alone = [right(0.0), right(0.1)], [right(0.01 * number) for number in range(9)]
+        >>> mentor = lab.Mentor.learn(lab.Recording(10, "cart", ("x",), ("speed",), shown), "distance")
+        >>> mentor.calibrate(alone, false_alarms=0.1).promise.kind
         'false alarms'
         >>> bool(mentor([0.5], [1.0])), bool(mentor([3.0], [1.0]))
         (False, True)
