@@ -1,6 +1,6 @@
 """The steps of demonstrations as a mentor looks them up: what was observed, what was done, how many steps were left."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -18,6 +18,11 @@ _STILL = 0.01  # least scale, as a share of the median one: a number that never 
 _ROUNDING = 1e-5  # standard deviation, as a share of the largest value, below which float32 numbers are all the same
 
 
+def shows_what_to_do(episode: Episode) -> NDArray[np.bool_]:
+    """Which steps (n,) are demonstrations: all of an episode that did not fail, the corrected ones of an episode that did."""
+    return episode.corrected if episode.success is False else np.ones(len(episode), bool)
+
+
 @dataclass(frozen=True, eq=False)
 class Demonstrated:
     """n steps: states (n, d), standardized by middle (d,) and scale (d,); actions (n, k); left (n,), the steps until the end.
@@ -33,12 +38,14 @@ class Demonstrated:
     action_scale: Array
 
     @classmethod
-    def of(cls, episodes: Iterable[Episode], rng: np.random.Generator) -> "Demonstrated":
-        """The steps of all episodes that did not fail, and the corrected steps of those that did; at most MOST_STEPS, drawn.
-
-        Raises BadInput if there is none.
-        """
-        chosen = [(episode, _taken(episode)) for episode in episodes]
+    def of(
+        cls,
+        episodes: Iterable[Episode],
+        rng: np.random.Generator,
+        shows: Callable[[Episode], NDArray[np.bool_]] = shows_what_to_do,
+    ) -> "Demonstrated":
+        """The steps (n,) of the episodes that `shows` marks; at most MOST_STEPS, drawn. Raises BadInput if there is none."""
+        chosen = [(episode, shows(episode)) for episode in episodes]
         chosen = [(episode, taken) for episode, taken in chosen if taken.any()]
         if not chosen:
             raise BadInput("demonstrations: no step of an episode that did not fail: wanted one or more")
@@ -64,11 +71,6 @@ class Demonstrated:
     @cached_property
     def _tree(self) -> Any:
         return scipy.spatial.cKDTree(self.states)
-
-
-def _taken(episode: Episode) -> NDArray[np.bool_]:
-    """Which steps (n,) show what to do."""
-    return episode.corrected if episode.success is False else np.ones(len(episode), bool)
 
 
 def _scale(values: Array) -> Array:

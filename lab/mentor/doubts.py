@@ -304,3 +304,14 @@ def steps_of(demonstrated: Demonstrated, episode: Episode) -> list[Step]:
             zip(demonstrated.standardized(episode.states), episode.actions, strict=True)
         )
     ]
+
+
+def doubts_of(doubt: Doubt, demonstrated: Demonstrated, episode: Episode) -> Array:
+    """The doubt (n,) at each step of an episode; after each takeover the measure begins anew."""
+    doubt.begin()
+    doubts = []
+    for step, corrected in zip(steps_of(demonstrated, episode), episode.corrected.tolist(), strict=True):
+        doubts.append(doubt(step))
+        if corrected:
+            doubt.begin()
+    return np.array(doubts)

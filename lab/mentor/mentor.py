@@ -11,7 +11,7 @@ from lab.errors import BadInput, counted, unknown
 from lab.files import read_limited, write_whole
 from lab.mentor.conformal import Promise, few_false_alarms, many_caught
 from lab.mentor.demonstrated import Array, Demonstrated
-from lab.mentor.doubts import DOUBTS, UNCALIBRATED, Arrays, Doubt, Step, steps_of
+from lab.mentor.doubts import DOUBTS, UNCALIBRATED, Arrays, Doubt, Step, doubts_of
 from lab.mentor.judge import Judge
 from lab.mentor.mentor_file import Kept, decode, encode
 from lab.recordings.episode import Episode, Recording
@@ -125,14 +125,9 @@ class Mentor:
 
     def doubts(self, episode: Episode) -> Array:
         """The doubt (n,) at each step of a recorded episode; after each takeover the measure begins anew."""
+        doubts = doubts_of(self._doubt, self.demonstrated, episode)
         self._doubt.begin()
-        doubts = []
-        for step, corrected in zip(steps_of(self.demonstrated, episode), episode.corrected.tolist(), strict=True):
-            doubts.append(self._doubt(step))
-            if corrected:
-                self._doubt.begin()
-        self._doubt.begin()
-        return np.array(doubts)
+        return doubts
 
     def peak(self, episode: Episode, lead: int = 0) -> float:
         """The largest doubt of an episode, its last `lead` steps left out; -inf if it has no others."""

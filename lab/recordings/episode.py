@@ -63,6 +63,12 @@ class Episode:
     def __len__(self) -> int:
         return len(self.states)
 
+    def part(self, start: int, end: int, success: bool | None) -> "Episode":
+        """The steps from `start` to before `end`, without pictures, as an episode of that success."""
+        own = slice(start, end)
+        extra = {name: values[own] for name, values in self.extra.items()}
+        return Episode(self.task, self.states[own], self.actions[own], self.corrected[own], success, extra=extra)
+
     def takeovers(self) -> list[tuple[int, int]]:
         """The first step and the step after the last of each stretch in which a teacher gave the actions."""
         edges = np.flatnonzero(np.diff(np.concatenate([[False], self.corrected, [False]]).astype(np.int8)))
