@@ -47,10 +47,12 @@ if TYPE_CHECKING:
     import rich.table
     import rich.text
     import scipy
+    import sklearn.neural_network
     import statsmodels.regression.mixed_linear_model
     import tensorboard.compat.proto.event_pb2
     import tensorboard.compat.proto.summary_pb2
     import tensorboard.summary.writer.event_file_writer
+    import threadpoolctl
     import torch
     import trimesh.voxel.ops
     import yaml
@@ -97,12 +99,14 @@ LIBRARIES: Mapping[str, Sequence[str]] = {
     "pydantic": ("pydantic",),
     "rich": ("rich.console", "rich.padding", "rich.panel", "rich.table", "rich.text"),
     "scipy": ("scipy",),
+    "sklearn": ("sklearn.neural_network",),
     "statsmodels": ("statsmodels.regression.mixed_linear_model",),
     "tensorboard": (
         "tensorboard.compat.proto.event_pb2",
         "tensorboard.compat.proto.summary_pb2",
         "tensorboard.summary.writer.event_file_writer",
     ),
+    "threadpoolctl": ("threadpoolctl",),
     "torch": ("torch",),
     "trimesh": ("trimesh.voxel.ops",),
     "yaml": ("yaml",),

@@ -12,7 +12,7 @@ EXTRAS = {  # extra in pyproject.toml -> the optional libraries that it installs
     "data": ("h5py", "minari", "pandas", "tensorboard"),
     "deep": ("torch",),
     "people": ("pyarrow", "statsmodels"),
-    "recordings": ("av", "pyarrow", "sklearn"),
+    "recordings": ("av", "pyarrow", "sklearn", "threadpoolctl"),
     "remote": ("fsspec", "s3fs"),
     "tune": ("optuna",),
 }

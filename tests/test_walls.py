@@ -60,6 +60,7 @@ ALONE: dict[str, set[str]] = (
         "av": {"lab.recordings.video"},
         "pyarrow": {"lab.classroom.export", "lab.recordings.lerobot_tables"},
         "sklearn": {"lab.cloning.student"},
+        "threadpoolctl": {"lab.cloning.student"},
         "statsmodels": {"lab.studies.people"},
         "lark": {"lab.words.slots"},
         "fsspec": {"lab.toolbox.remote_place"},

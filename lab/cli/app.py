@@ -125,6 +125,11 @@ COMMANDS = {  # words after `lab` -> the command
         "lab export toast-run --format jbi",
         more="{words of exporting}",
     ),
+    "mentor": Command(
+        "mentor",
+        "Compare where rules would have asked with where a person took over in a recording, or keep a mentor for your policy.",
+        "lab mentor my-dataset --report report.html",
+    ),
     "see": Command(
         "see",
         "Picture to grid: find the gripper (magenta), the machine's marker (cyan) and the obstacles (green).",

@@ -42,6 +42,9 @@ if TYPE_CHECKING:
     from lab.learning.selection import SELECTIONS
     from lab.learning.settings import USUAL
     from lab.learning.updates import UPDATES
+    from lab.mentor.doubts import DOUBTS
+    from lab.mentor.mentor import Mentor
+    from lab.mentor.takeovers import RULES, Compared, compared
     from lab.plugins.code_file import is_file_word, take
     from lab.production import load_run
     from lab.production.composer import Conditions
@@ -123,6 +126,7 @@ if TYPE_CHECKING:
     from lab.view.canvas import check_picture
     from lab.view.cell_plan import draw_cell
     from lab.view.cyclic_summary import cyclic_summary
+    from lab.view.mentor_report import COLUMNS, report_document, report_page, table_lines
     from lab.view.meshcat import LiveView, replay_html
     from lab.view.movie import write_movie
     from lab.view.progress import EscapingConsole, counting
@@ -192,6 +196,9 @@ TABLE = {
     "lab.learning.selection": ("SELECTIONS",),
     "lab.learning.settings": ("USUAL",),
     "lab.learning.updates": ("UPDATES",),
+    "lab.mentor.doubts": ("DOUBTS",),
+    "lab.mentor.mentor": ("Mentor",),
+    "lab.mentor.takeovers": ("RULES", "Compared", "compared"),
     "lab.plugins.code_file": ("is_file_word", "take"),
     "lab.production": ("load_run",),
     "lab.production.composer": ("Conditions",),
@@ -267,6 +274,7 @@ TABLE = {
     "lab.view.cell_plan": ("draw_cell",),
     "lab.view.cyclic_summary": ("cyclic_summary",),
     "lab.view.progress": ("counting", "EscapingConsole"),
+    "lab.view.mentor_report": ("COLUMNS", "report_document", "report_page", "table_lines"),
     "lab.view.meshcat": ("LiveView", "replay_html"),
     "lab.view.movie": ("write_movie",),
     "lab.view.schedule_scene": ("scene_of",),

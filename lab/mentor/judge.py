@@ -19,27 +19,28 @@ class Judge:
     helped: int = 0
     judged: int = 0
     rejects: bool = False  # whether takeovers mislead
-    _alone: list[float] = field(default_factory=list)  # the steps left, before each of the policy's own steps
-    _taken: list[float] = field(default_factory=list)  # and before each of the teacher's
+    _lefts: list[float] = field(default_factory=list)  # the steps left before each step of the episode
+    _alone: int = 0  # the step from which on the policy has acted alone
+    _taken_at: int | None = None  # the first step of the takeover that is going on
 
     def begin(self) -> None:
         """An episode begins: a takeover that ended with the one before is not judged."""
-        self._alone, self._taken = [], []
+        self._lefts, self._alone, self._taken_at = [], 0, None
 
     def saw(self, left: float, corrected: bool) -> None:
-        """Hears of the next step: how many steps are left before it, and whether a teacher gives its action."""
-        if corrected:
-            self._taken.append(left)
-            return
-        if self._taken:
-            self._hand_back(left)
-        self._alone.append(left)
+        """Hears how many steps are left before the next step, and whether a teacher gave the action of the one before."""
+        if corrected and self._taken_at is None and self._lefts:
+            self._taken_at = len(self._lefts) - 1
+        elif not corrected and self._taken_at is not None:
+            self._hand_back(self._taken_at, len(self._lefts) - 1)
+            self._alone, self._taken_at = len(self._lefts) - 1, None
+        self._lefts.append(left)
 
-    def _hand_back(self, left: float) -> None:
-        start, steps = self._taken[0], len(self._taken)
-        before = self._alone[-steps:]
-        alone = (before[0] - start) / len(before) if before else 0.0
-        self.helped += (start - left) / steps > alone
+    def _hand_back(self, taken: int, back: int) -> None:
+        """Judges the takeover of the steps from `taken` to before `back`."""
+        steps = back - taken
+        before = max(taken - steps, self._alone)
+        alone = (self._lefts[before] - self._lefts[taken]) / (taken - before) if taken > before else 0.0
+        self.helped += (self._lefts[taken] - self._lefts[back]) / steps > alone
         self.judged += 1
         self.rejects = bool(scipy.special.bdtr(self.helped, self.judged, 0.5) < _LEVEL)  # the binomial distribution
-        self._alone, self._taken = [], []

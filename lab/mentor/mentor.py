@@ -148,7 +148,8 @@ class Mentor:
 
         observation, action: numbers (d,) and (k,), tensors, or mappings by the names of the recording, such as LeRobot's.
         chunk (h, k): the actions that the policy plans from here on; members (m, k): those of the members of an ensemble.
-        corrected: whether a teacher gives the action of this step; the judge needs to know. Raises BadInput for other widths.
+        corrected: whether a teacher gave the action of the step before; the judge needs to know.
+        Raises BadInput for other widths.
         """
         state = self.demonstrated.standardized(
             _numbers(observation, self.state_names, "observation", "observation.state")
@@ -162,19 +163,22 @@ class Mentor:
             _rows(members, len(self.action_names), "members"),
         )
         self._number += 1
-        doubt = self._doubt(step)
         self.judge.saw(step.left, corrected)
         if corrected:
             self._doubt.begin()
+        doubt = self._doubt(step)
         rejected = self.judge.rejects
         return Question(doubt > self.threshold and not rejected, doubt, self.threshold, self.rule, rejected)
 
     # ---- kept ----------------------------------------------------------------------------------------------------
 
     def save(self, path: Path | str) -> None:
-        """Writes the mentor to a safetensors file, whole or not at all."""
+        """Writes the mentor to a safetensors file, whole or not at all. Raises BadInput if it cannot be written."""
         kept = Kept(self.rule, self.state_names, self.action_names, self.threshold, self.promise)
-        write_whole(Path(path), encode(kept, self.demonstrated, self.arrays))
+        try:
+            write_whole(Path(path), encode(kept, self.demonstrated, self.arrays))
+        except OSError as error:
+            raise BadInput(f"mentor file '{path}' cannot be written: {error.strerror or error}") from error
 
     @classmethod
     def load(cls, path: Path | str) -> Self:

@@ -4,11 +4,13 @@ from lab.mentor.judge import Judge
 
 
 def tell(judge: Judge, alone: list[float], taken: list[float], after: float) -> None:
+    """Tells of an episode: the steps left before each of the policy's steps, before each of the teacher's, and after them."""
     judge.begin()
-    for left in alone:
-        judge.saw(left, corrected=False)
-    for left in taken:
-        judge.saw(left, corrected=True)
+    by_teacher = [False] * len(alone) + [True] * len(taken) + [False]
+    gave_last = False
+    for left, given in zip([*alone, *taken, after], by_teacher, strict=True):
+        judge.saw(left, gave_last)
+        gave_last = given
     judge.saw(after, corrected=False)
 
 
@@ -30,8 +32,10 @@ def test_a_takeover_at_the_first_step_is_held_against_standing_still() -> None:
 
 def test_a_takeover_that_ends_with_its_episode_is_not_judged() -> None:
     judge = Judge()
-    judge.saw(10, corrected=True)
+    judge.saw(10, corrected=False)
+    judge.saw(9, corrected=True)
     judge.begin()
+    judge.saw(10, corrected=False)
     judge.saw(10, corrected=False)
     assert judge.judged == 0
 
