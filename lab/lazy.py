@@ -6,6 +6,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    import av
     import cv2
     import distributed
     import fsspec.core
@@ -60,6 +61,7 @@ if TYPE_CHECKING:
 # library -> the modules that are loaded with it: `from lab.lazy import trimesh` stands for `import trimesh`, and loads it when
 # one of its names is first used
 LIBRARIES: Mapping[str, Sequence[str]] = {
+    "av": ("av",),
     "cv2": ("cv2",),
     "distributed": ("distributed",),
     "fsspec": ("fsspec.core",),
