@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from lab.learning.updates import UPDATES
     from lab.mentor.doubts import DOUBTS
     from lab.mentor.mentor import Mentor
-    from lab.mentor.takeovers import RULES, Compared, compared
+    from lab.mentor.takeovers import RULES, RulesCompared, rules_compared
     from lab.plugins.code_file import is_file_word, take
     from lab.production import load_run
     from lab.production.composer import Conditions
@@ -61,6 +61,7 @@ if TYPE_CHECKING:
     from lab.production.run_journal import RunJournal, is_run, replayed_run
     from lab.production.run_options import RunOptions, begun, kept_task
     from lab.production.run_options import gone_on as run_gone_on
+    from lab.recordings.lerobot_read import read as read_recording
     from lab.seat.language_model import language_models
     from lab.seat.lesson_seat import LessonSeat
     from lab.seat.page.finding_page import FindingPage
@@ -96,7 +97,7 @@ if TYPE_CHECKING:
     from lab.tasks.instances import INSTANCES, pyjobshop
     from lab.tasks.instances import InstanceRequest as InstanceAsked
     from lab.tasks.new_task import MACHINE, Changes, file_of, new_task
-    from lab.tasks.record import write_whole as write_task_text
+    from lab.tasks.record import write_whole as write_text
     from lab.tasks.robot_fields import MODELS
     from lab.tasks.schedule_table import read_schedule
     from lab.tasks.schema import page_of, schema_of
@@ -198,7 +199,7 @@ TABLE = {
     "lab.learning.updates": ("UPDATES",),
     "lab.mentor.doubts": ("DOUBTS",),
     "lab.mentor.mentor": ("Mentor",),
-    "lab.mentor.takeovers": ("RULES", "Compared", "compared"),
+    "lab.mentor.takeovers": ("RULES", "RulesCompared", "rules_compared"),
     "lab.plugins.code_file": ("is_file_word", "take"),
     "lab.production": ("load_run",),
     "lab.production.composer": ("Conditions",),
@@ -227,6 +228,7 @@ TABLE = {
     "lab.seat.terminal.prompt": ("TeachingPrompt",),
     "lab.seat.terminal.replay_keys": ("HELP as KEYS_HELP", "replay_keys"),
     "lab.seat.terminal.subtask_questions": ("accepted_by",),
+    "lab.recordings.lerobot_read": ("read as read_recording",),
     "lab.sequencing": ("SEQUENCERS",),
     "lab.sequencing.cell.objectives": ("OBJECTIVES",),
     "lab.sequencing.methods.srl_advised": ("FITTING",),
@@ -247,7 +249,7 @@ TABLE = {
     "lab.tasks.grid_world": ("write_random",),
     "lab.tasks.instances": ("InstanceRequest as InstanceAsked", "INSTANCES", "pyjobshop"),
     "lab.tasks.new_task": ("Changes", "file_of", "MACHINE", "new_task"),
-    "lab.tasks.record": ("write_whole as write_task_text",),
+    "lab.tasks.record": ("write_whole as write_text",),
     "lab.tasks.robot_fields": ("MODELS",),
     "lab.tasks.schedule_table": ("read_schedule",),
     "lab.tasks.schema": ("page_of", "schema_of"),

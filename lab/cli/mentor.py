@@ -19,7 +19,8 @@ def mentor(
         Path | None, typer.Option("--report", help="File (.html) for a page with curves, episodes and pictures.")
     ] = None,
     window_s: Annotated[
-        float, typer.Option("--window", min=0.01, max=600, help="Seconds before a takeover in which an alarm warns of it.")
+        float,
+        typer.Option("--window", min=0.01, max=600, help="Seconds before a takeover in which an alarm warns of it."),
     ] = 3.0,
     false_alarms: Annotated[
         float, typer.Option("--false-alarms", help="Share of the episodes without need in which a rule may ask.")
@@ -29,7 +30,8 @@ def mentor(
         typer.Option("--keep", help="File for a mentor that has learned from DATASET, calibrated by --rollouts."),
     ] = None,
     rollouts: Annotated[
-        Path | None, typer.Option("--rollouts", help="For --keep: a dataset of the policy's rollouts without a teacher.")
+        Path | None,
+        typer.Option("--rollouts", help="For --keep: a dataset of the policy's rollouts without a teacher."),
     ] = None,
     rule: Annotated[
         str, typer.Option("--rule", help="For --keep, the measure of doubt: {doubts}.", autocompletion=offers("doubts"))
@@ -54,7 +56,7 @@ def mentor(
         return
     with deferred.counting(console(), "rules compared") as progress:
         done = iter(range(len(deferred.RULES)))
-        compared = deferred.compared(
+        compared = deferred.rules_compared(
             recording,
             window_s=window_s,
             false_alarms=false_alarms,
@@ -95,15 +97,15 @@ def _kept_summary(document: dict[str, Any]) -> "rich.console.RenderableType":
     )
 
 
-def _summary(compared: "deferred.Compared", report: Path | None) -> "rich.console.RenderableType":
+def _summary(compared: "deferred.RulesCompared", report: Path | None) -> "rich.console.RenderableType":
     table = rich.table.Table(box=None, pad_edge=False)
     for number, name in enumerate(deferred.COLUMNS):
         table.add_column(name, justify="right" if number else "left")
     for line in deferred.table_lines(compared):
         table.add_row(*line)
     below = [
-        f"a takeover was warned of if an alarm began in the {compared.window_s:g} s before it; by chance: as many alarms at "
-        "random steps",
+        f"a takeover was warned of, and an alarm right, if the alarm began in the {compared.window_s:g} s before it",
+        "by chance: as many alarms at random steps",
         *compared.notes,
         *([f"page: {report}"] if report else []),
     ]

@@ -18,7 +18,6 @@ Action = NDArray[np.float32]
 Policy = Callable[[Any], Action]
 Asks = Callable[[Any, Action], bool]
 DEMONSTRATING, CALIBRATING, CORRECTING, EVALUATING = range(4)  # what seeds are drawn for: none serves for two
-EVERY_STEPS = 50  # of the rivals: the clock asks as often, chance as often on average
 
 
 class RollsOut(Protocol):
@@ -35,7 +34,8 @@ class CloningOptions:
     demonstrations: episodes of the teacher at the start. rounds: of asking. questions: takeovers in a round, at most.
     takeover_steps: for which the teacher then acts. rule: of the mentor. false_alarms: in which share of the episodes that
     would have succeeded it may ask. calibrated: rollouts without a teacher that set the threshold of a round. episodes: with a
-    teacher in a round, at most. evaluated: rollouts by which a student is measured, the same after each round.
+    teacher in a round, at most. every_steps: after so many steps the rule "clock" asks, and "random" on average. evaluated:
+    rollouts by which a student is measured, the same after each round.
     """
 
     demonstrations: int = 5
@@ -46,6 +46,7 @@ class CloningOptions:
     false_alarms: float = 0.2
     calibrated: int = 20
     episodes: int = 40
+    every_steps: int = 50
     evaluated: int = 30
     seed: int = 0
 
@@ -141,7 +142,8 @@ def _mentor(
     except BadInput:  # the failure predictor, when all rollouts or none failed
         mentor = Mentor.learn(recording, "distance", seed=options.seed)
     if options.rule in ("random", "clock"):
-        mentor.threshold = 1.0 - 1.0 / EVERY_STEPS if options.rule == "random" else float(EVERY_STEPS - 1)
+        often = options.every_steps
+        mentor.threshold = 1.0 - 1.0 / often if options.rule == "random" else often - 1.5  # the clock counts from 0
         return mentor
     well = [episode for episode in rollouts if episode.success]
     if (len(well) + 1) * options.false_alarms >= 1.0:

@@ -51,7 +51,7 @@ class Rule:
 
 
 @dataclass(frozen=True, eq=False)
-class Compared:
+class RulesCompared:
     """Rules on one recording; notes: sentences on what could not be compared. minutes: of the policy's own steps."""
 
     recording: Recording
@@ -63,7 +63,7 @@ class Compared:
     notes: Sequence[str]
 
 
-def compared(
+def rules_compared(
     recording: Recording,
     *,
     window_s: float = 3.0,
@@ -71,7 +71,7 @@ def compared(
     rules: Sequence[str] = RULES,
     seed: int = 0,
     progress: Callable[[str], None] = lambda name: None,
-) -> Compared:
+) -> RulesCompared:
     """The rules in a recording with takeovers, each measured in episodes that it did not learn from.
 
     window_s: how long before a takeover an alarm counts as its warning. false_alarms: the share of the stretches without a
@@ -100,7 +100,7 @@ def compared(
         done.append(_measured(name, episodes, doubts, thresholds, window, recording.fps))
     if not done:
         raise BadInput(f"recording: no rule can be compared: {notes[0]}")
-    return Compared(recording, window_s, false_alarms, takeovers, alone / recording.fps / 60.0, done, notes)
+    return RulesCompared(recording, window_s, false_alarms, takeovers, alone / recording.fps / 60.0, done, notes)
 
 
 def stretches(episode: Episode) -> list[tuple[int, int, bool]]:

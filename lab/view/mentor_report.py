@@ -10,7 +10,7 @@ import numpy as np
 from lab.errors import counted
 from lab.lazy import matplotlib
 from lab.mentor.doubts import DOUBTS
-from lab.mentor.takeovers import Compared, Rule
+from lab.mentor.takeovers import Rule, RulesCompared
 from lab.recordings.episode import Episode, Image
 from lab.version import __version__
 from lab.view.canvas import BLUE, GREEN, GREY, INK, ORANGE, PALE_GREY, PURPLE, RED, SKY, picture_bytes, seconds
@@ -25,14 +25,11 @@ MOST_EPISODES = 12  # that are drawn, those with takeovers first
 MOST_FRAMES = 6  # of an episode
 MOST_DOUBT = 3.0  # thresholds high that a plot is
 NOTHING = "–"
-COLUMNS = (
-    *("rule", "alarms", "takeovers warned of", "by chance", "alarms before a takeover", "by chance"),
-    *("median lead", "area under ROC"),
-)
+COLUMNS = ("rule", "alarms", "takeovers warned of", "by chance", "right alarms", "by chance", "lead", "ROC area")
 Json = dict[str, Any]
 
 
-def report_document(compared: Compared) -> Json:
+def report_document(compared: RulesCompared) -> Json:
     """The comparison as a JSON document."""
     return {
         "episodes": len(compared.recording.episodes),
@@ -57,7 +54,7 @@ def report_document(compared: Compared) -> Json:
     }
 
 
-def table_lines(compared: Compared) -> list[tuple[str, ...]]:
+def table_lines(compared: RulesCompared) -> list[tuple[str, ...]]:
     """The cells of the table, a line a rule; COLUMNS heads it."""
     return [
         (
@@ -74,7 +71,7 @@ def table_lines(compared: Compared) -> list[tuple[str, ...]]:
     ]
 
 
-def report_page(compared: Compared, name: str) -> str:
+def report_page(compared: RulesCompared, name: str) -> str:
     """The HTML of the report of a recording called `name`."""
     episodes = sorted(range(len(compared.recording.episodes)), key=lambda number: not _taken(compared, number))
     shown = [number for number in episodes if _taken(compared, number)][:MOST_EPISODES] or episodes[:1]
@@ -82,17 +79,18 @@ def report_page(compared: Compared, name: str) -> str:
         TEMPLATE,
         title=f"Where rules would have asked in {name}",
         head=(
-            f"{counted(len(episodes), 'episode')} of {compared.recording.robot}, {compared.minutes:.1f} minutes of a policy's own "
-            f"steps, {counted(compared.takeovers, 'takeover')} by a person; Teaching Lab {__version__}."
+            f"{counted(len(episodes), 'episode')} of {compared.recording.robot}, {compared.minutes:.1f} minutes of a policy's "
+            f"own steps, {counted(compared.takeovers, 'takeover')} by a person; Teaching Lab {__version__}."
         ),
         notes=compared.notes,
         columns=COLUMNS,
         lines=table_lines(compared),
         meaning=(
-            f"A takeover was warned of if an alarm began in the {compared.window_s:g} s before it. The threshold of each rule lets it "
+            "A takeover was warned of, and an alarm right, if the alarm began in the "
+            f"{compared.window_s:g} s before it; the lead is the median time between them. The threshold of each rule lets it "
             f"ask in {100 * compared.false_alarms:g} % of the stretches in which nobody took over, by all other episodes; the doubt "
             "in an episode is measured by what was learned from others. By chance: what as many alarms at random steps reach on "
-            "average."
+            "average. ROC area: how often a step in the time before a takeover has more doubt than another one (0.5 by chance)."
         ),
         curves=_embedded(curves_figure(compared)),
         episodes=[
@@ -105,7 +103,7 @@ def report_page(compared: Compared, name: str) -> str:
     )
 
 
-def curves_figure(compared: Compared) -> bytes:
+def curves_figure(compared: RulesCompared) -> bytes:
     """An SVG picture: the share of takeovers that each rule warns of, against its alarms a minute."""
     most = 4.0 * max(compared.takeovers / compared.minutes, 0.5)  # alarms a minute
 
@@ -125,7 +123,7 @@ def curves_figure(compared: Compared) -> bytes:
     return picture_bytes(draw, 7.2, 3.4)
 
 
-def episode_figure(compared: Compared, number: int) -> bytes:
+def episode_figure(compared: RulesCompared, number: int) -> bytes:
     """An SVG picture of one episode: each rule's doubt, in thresholds; takeovers, alarms, and pictures where they begin."""
     episode, fps = compared.recording.episodes[number], compared.recording.fps
     frames = _frames(episode, compared.rules, number)
@@ -146,7 +144,12 @@ def episode_figure(compared: Compared, number: int) -> bytes:
             axes.plot(times, np.minimum(heights, MOST_DOUBT), color=colour, linewidth=1.2, label=rule.name)
             asked = [*rule.asked[number]]
             axes.plot(
-                times[asked], np.minimum(heights[asked], MOST_DOUBT), "v", color=colour, markersize=7, markeredgecolor="white"
+                times[asked],
+                np.minimum(heights[asked], MOST_DOUBT),
+                "v",
+                color=colour,
+                markersize=7,
+                markeredgecolor="white",
             )
         axes.axhline(1.0, color=INK, linewidth=0.8)
         axes.set(xlim=(0.0, max(len(episode) / fps, 1 / fps)), ylim=(0.0, MOST_DOUBT * 1.05), xlabel="time [s]")
@@ -177,7 +180,7 @@ def _frames(episode: Episode, rules: Sequence[Rule], number: int) -> list[tuple[
     return [(step, steps[step]) for step in sorted(chosen)]
 
 
-def _taken(compared: Compared, number: int) -> bool:
+def _taken(compared: RulesCompared, number: int) -> bool:
     return bool(compared.recording.episodes[number].corrected.any())
 
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.errors import BadInput
-from lab.mentor.takeovers import alarms, compared, stretches
+from lab.mentor.takeovers import alarms, rules_compared, stretches
 from lab.recordings.episode import Episode, Recording
 from tests.mentor.conftest import Run
 
@@ -42,7 +42,7 @@ def strays(run: Run) -> Recording:
 
 
 def test_straying_is_caught_two_steps_before_the_person_takes_over(strays: Recording) -> None:
-    result = compared(strays, window_s=3, false_alarms=0.1, rules=["distance", "clock"])
+    result = rules_compared(strays, window_s=3, false_alarms=0.1, rules=["distance", "clock"])
     distance, clock = result.rules
     assert result.takeovers == 4
     assert result.minutes == pytest.approx((12 * 11 + 4 * 6) / 60)
@@ -60,7 +60,7 @@ def test_straying_is_caught_two_steps_before_the_person_takes_over(strays: Recor
 
 
 def test_chance_is_what_as_many_random_alarms_reach(strays: Recording) -> None:
-    (rule,) = compared(strays, window_s=3, false_alarms=0.1, rules=["distance"]).rules
+    (rule,) = rules_compared(strays, window_s=3, false_alarms=0.1, rules=["distance"]).rules
     steps = 12 * 11 + 4 * 6
     assert rule.chance_precision == pytest.approx(4 * 3 / steps)
     assert rule.chance_recall == pytest.approx(1 - (1 - 4 / steps) ** 3)
@@ -71,13 +71,13 @@ def test_no_episode_is_measured_by_what_was_learned_from_it(run: Run) -> None:
     straight = [0.1 * step for step in range(11)]
     odd = run([0.0, 0.1, 7.0, 0.2, 0.3])
     recording = cart([run(straight) for _ in range(12)] + [odd, run([0.0, 0.1, 0.1], corrected=[2])])
-    (rule,) = compared(recording, window_s=1, rules=["distance"]).rules
+    (rule,) = rules_compared(recording, window_s=1, rules=["distance"]).rules
     assert rule.doubts[12].argmax() == 2
     assert rule.doubts[12][2] > 10 * max(doubts.max() for doubts in rule.doubts[:12])
 
 
 def test_a_rule_that_the_recording_cannot_feed_is_left_out_and_told(strays: Recording) -> None:
-    result = compared(strays, rules=["chunk", "distance"])
+    result = rules_compared(strays, rules=["chunk", "distance"])
     assert [rule.name for rule in result.rules] == ["distance"]
     assert any("chunk" in note for note in result.notes)
 
@@ -85,11 +85,11 @@ def test_a_rule_that_the_recording_cannot_feed_is_left_out_and_told(strays: Reco
 @pytest.mark.parametrize("corrected", [[], [1]])
 def test_a_recording_without_takeovers_or_others_is_refused(run: Run, corrected: list[int]) -> None:
     with pytest.raises(BadInput, match="recording"):
-        compared(cart([run([0, 1, 2], corrected=corrected)]))
+        rules_compared(cart([run([0, 1, 2], corrected=corrected)]))
 
 
 def test_the_same_seed_compares_the_same(strays: Recording) -> None:
-    first, again = (compared(strays, rules=["ensemble", "failure"], seed=5) for _ in range(2))
+    first, again = (rules_compared(strays, rules=["ensemble", "failure"], seed=5) for _ in range(2))
     for one, other in zip(first.rules, again.rules, strict=True):
         assert [d.tolist() for d in one.doubts] == [d.tolist() for d in other.doubts]
 
