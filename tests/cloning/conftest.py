@@ -14,13 +14,14 @@ MOST = 40
 
 def straight_on(observation: Any) -> np.ndarray:
     """The teacher: towards 1."""
-    return np.clip((1.0 - np.asarray(observation, np.float32)[:1]) * 20.0, -1.0, 1.0).astype(np.float32)
+    return np.asarray(np.clip((1.0 - np.asarray(observation)[:1]) * 20.0, -1.0, 1.0), np.float32)
 
 
 def rolled_out(policy: Any, seed: int, *, asks: Any = None, teacher: Any = straight_on) -> Episode:
     """An episode from a place between 0 and 0.5; a step is at most 0.05, with noise. It ends within 0.03 of 1."""
     rng = np.random.default_rng(seed)
-    x, states, actions, corrected = rng.uniform(0.0, 0.5), [], [], []
+    x = rng.uniform(0.0, 0.5)
+    states, actions, corrected = list[Any](), list[Any](), list[bool]()
     while len(states) < MOST and abs(x - 1.0) > 0.03:
         observation = np.array([x], np.float32)
         action = np.asarray(policy(observation), np.float32)
