@@ -1,6 +1,5 @@
 """`lab clone`: a student of demonstrations that asks where its mentor doubts."""
 
-from collections.abc import Iterator
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -40,7 +39,8 @@ def clone(
         int, typer.Option("--evaluated", min=1, max=100_000, help="Episodes by which each round's student is measured.")
     ] = 30,
     resume: Annotated[
-        Path | None, typer.Option("--resume", help="Continue the session in this folder, with its options; more --rounds.")
+        Path | None,
+        typer.Option("--resume", help="Continue the session in this folder, with its options; more --rounds."),
     ] = None,
     seed: Seed = 0,
     out: Annotated[
@@ -61,10 +61,6 @@ def clone(
         kept = deferred.cloning_options_of(resume)
         kept = replace(kept, options=replace(kept.options, rounds=max(rounds, kept.options.rounds)))
     else:
-        if rule not in deferred.DOUBTS:
-            raise deferred.unknown("rule", rule, tuple(deferred.DOUBTS), "--rule")
-        if not 0.0 < false_alarms < 1.0:
-            raise BadInput(f"--false-alarms {false_alarms:g}: wanted a share above 0 and below 1")
         if out is not None:
             deferred.check_new_cloning(out)
         options = deferred.CloningOptions(
@@ -76,16 +72,16 @@ def clone(
             evaluated=evaluated,
             seed=seed,
         )
-        kept = deferred.KeptOptions(deferred.SkillProblem(task, str(skill), noise), options)
+        kept = deferred.KeptCloningOptions(deferred.SkillProblem(task, str(skill), noise), options)
         kept.problem.env  # noqa: B018  # a task or skill that is unknown is refused before anything is written
     folder = resume or out
-    session = None
+    measured = list[Any]()
     try:
-        for session in _sessions(folder, kept):
-            console().print(_line(session.measured[-1]), markup=False)
+        for session in deferred.rounds_of(kept, folder):
+            measured = session.measured
+            console().print(_line(measured[-1]), markup=False)
     finally:
         kept.problem.close()
-    measured = session.measured if session is not None else deferred.measured_in(folder)
     document = {
         "task": kept.problem.task,
         "skill": kept.problem.skill,
@@ -94,3 +90,37 @@ def clone(
         "out": None if folder is None else str(folder),
     }
     show(document, as_json, _summary)
+
+
+def _line(measured: Any) -> str:
+    failures = measured.successes.count(False)
+    successes = len(measured.successes) - failures
+    return (
+        f"round {measured.round}: {100 * measured.success:.0f} % of {counted(len(measured.successes), 'episode')} after "
+        f"{counted(measured.questions, 'question')}; its mentor doubts in {measured.warned} of "
+        f"{counted(failures, 'failure')} and in {measured.false_alarms} of {counted(successes, 'success')}"
+    )
+
+
+def _summary(document: dict[str, Any]) -> "rich.console.RenderableType":
+    table = rich.table.Table(box=None, pad_edge=False)
+    for number, name in enumerate(
+        ("round", "success", "questions", "corrected steps", "failures doubted", "lead [steps]")
+    ):
+        table.add_column(name, justify="right" if number else "left")
+    for one in document["rounds"]:
+        leads = sorted(one["lead_steps"])
+        table.add_row(
+            str(one["round"]),
+            f"{100 * one['success']:.0f} %",
+            str(one["questions"]),
+            str(one["corrected_steps"]),
+            f"{one['warned']} of {[*one['successes']].count(False)}",
+            str(leads[len(leads) // 2]) if leads else "–",
+        )
+    below = [f"{document['skill']} of {document['task']}, asking by '{document['rule']}'"]
+    if any(one["rejected"] for one in document["rounds"]):
+        below.append("it asks no more: the takeovers have not helped")
+    if document["out"]:
+        below.append(f"in {document['out']}: demonstrations and corrections as LeRobot datasets, students, mentors")
+    return rich.console.Group(table, rich.text.Text("\n".join(below)))

@@ -31,6 +31,12 @@ if TYPE_CHECKING:
     from lab.classroom.holding import attend, begun_words, closing, place_of
     from lab.classroom.roster import Roster
     from lab.classroom.study import Study as StudyWithPeople
+    from lab.cloning.kept_cloning import KeptOptions as KeptCloningOptions
+    from lab.cloning.kept_cloning import check_new as check_new_cloning
+    from lab.cloning.kept_cloning import options_of as cloning_options_of
+    from lab.cloning.kept_cloning import rounds_of
+    from lab.cloning.rounds import CloningOptions
+    from lab.cloning.skill_problem import SkillProblem
     from lab.export import FORMATS
     from lab.export.commands import Path as Lines
     from lab.export.play import deviation
@@ -186,6 +192,14 @@ TABLE = {
     "lab.classroom.holding": ("attend", "begun_words", "closing", "place_of"),
     "lab.classroom.roster": ("Roster",),
     "lab.classroom.study": ("Study as StudyWithPeople",),
+    "lab.cloning.kept_cloning": (
+        "KeptOptions as KeptCloningOptions",
+        "check_new as check_new_cloning",
+        "options_of as cloning_options_of",
+        "rounds_of",
+    ),
+    "lab.cloning.rounds": ("CloningOptions",),
+    "lab.cloning.skill_problem": ("SkillProblem",),
     "lab.export": ("FORMATS",),
     "lab.export.commands": ("Path as Lines",),
     "lab.export.program": ("Options", "POSITIONS", "Program"),

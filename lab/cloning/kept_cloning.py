@@ -35,7 +35,9 @@ def check_new(folder: Path) -> None:
     """Raises BadInput unless a session can begin in a folder: it is not there, or empty."""
     check_out(folder)
     if folder.is_dir() and any(not path.name.startswith(".") for path in folder.iterdir()):
-        raise BadInput(f"output folder '{folder}' (--out): it holds files: give another one, or go on with --resume {folder}")
+        raise BadInput(
+            f"output folder '{folder}' (--out): it holds files: give another one, or go on with --resume {folder}"
+        )
 
 
 def options_of(folder: Path) -> KeptOptions:
@@ -43,18 +45,24 @@ def options_of(folder: Path) -> KeptOptions:
     return read_json(folder / SESSION, KeptOptions, f"session '{folder}' (--resume)", _WANTED)
 
 
-def kept_rounds(folder: Path, kept: KeptOptions) -> Iterator[Cloning]:
-    """The session after each round that the folder does not hold yet; a round is in the folder once it is handed out.
+def rounds_of(kept: KeptOptions, folder: Path | None) -> Iterator[Cloning]:
+    """The session after its last round in a folder, if that holds one, and after each further round, which is kept in the folder.
 
-    Raises BadInput for a damaged folder, WorkFailed if it cannot be written.
+    folder: None keeps nothing. Raises BadInput for a damaged folder, WorkFailed if it cannot be written.
     """
+    if folder is None:
+        yield from cloned(kept.problem, kept.problem.demonstrated(kept.options), kept.options)
+        return
     if not (folder / SESSION).exists():
         _write(folder / SESSION, json.dumps(asdict(kept), indent=1))
     if not (folder / DEMONSTRATIONS).is_dir():
         write(kept.problem.demonstrated(kept.options), folder / DEMONSTRATIONS)
     demonstrations = read(folder / DEMONSTRATIONS)
     session = loaded(folder, demonstrations)
-    known = len(session.corrections) if session is not None else 0
+    known = 0
+    if session is not None:
+        known = len(session.corrections)
+        yield session
     for after in cloned(kept.problem, demonstrations, kept.options, session):
         _keep(folder, kept.problem, after, known)
         known = len(after.corrections)
@@ -73,9 +81,7 @@ def loaded(folder: Path, demonstrations: Recording) -> Cloning | None:
     last = _of_round(folder, len(measured) - 1)
     mentor = Mentor.load(last / MENTOR)
     mentor.judge = Judge(measured[-1].helped, measured[-1].judged, measured[-1].rejected)
-    return Cloning(
-        demonstrations, Student.load(last / STUDENT), mentor, corrections, measured, measured[-1].questions
-    )
+    return Cloning(demonstrations, Student.load(last / STUDENT), mentor, corrections, measured, measured[-1].questions)
 
 
 def _keep(folder: Path, problem: SkillProblem, session: Cloning, known: int) -> None:

@@ -2,15 +2,16 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Annotated, Any, Protocol
 
 import numpy as np
+from annotated_types import Gt, Lt
 from numpy.typing import NDArray
 
 from lab.cloning.student import Student
-from lab.errors import BadInput
+from lab.errors import BadInput, check_value, unknown
 from lab.mentor.conformal import Promise
-from lab.mentor.doubts import UNCALIBRATED
+from lab.mentor.doubts import DOUBTS, UNCALIBRATED
 from lab.mentor.mentor import Mentor
 from lab.recordings.episode import Episode, Recording
 
@@ -49,6 +50,11 @@ class CloningOptions:
     every_steps: int = 50
     evaluated: int = 30
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.rule not in DOUBTS:
+            raise unknown("rule", self.rule, tuple(DOUBTS), "clone")
+        check_value("false_alarms", self.false_alarms, Annotated[float, Gt(0), Lt(1)], "clone")
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 from lab.cloning.rounds import DEMONSTRATING, Asks, CloningOptions, Policy, seeds_for
 from lab.control import ControlEnv, ScriptedTeacher, recording, roll_out
