@@ -240,6 +240,24 @@ class World:
         self._call("resetBasePositionAndOrientation", entry.number, list(at), list(turn))
         entry.pose = (tuple(position), tuple(quaternion))
 
+    def remove(self, name: str) -> None:
+        """Take a body out of the world, with its contacts; a body that is added next gets its place in the engine."""
+        number = self._bodies.pop(name).number
+        del self._names[number]
+        self._call("removeBody", number)
+
+    def forget_contacts(self, name: str) -> None:
+        """Lets the engine recompute, at its next step, all contacts of a body's links, in the order of a new world."""
+        entry = self._bodies[name]
+        for link in entry.links.values():
+            self._call("setCollisionFilterGroupMask", entry.number, link, GROUP, ALL)
+
+    def touched(self, name: str) -> set[str]:
+        """The names of the bodies that a body touched in the last step."""
+        number = self._bodies[name].number
+        points = self._call("getContactPoints", number)
+        return {self._names[n] for point in points for n in point[1:3] if n in self._names and n != number}
+
     def names(self) -> list[str]:
         """All bodies, in the order in which they came."""
         return list(self._bodies)
