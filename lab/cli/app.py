@@ -128,7 +128,7 @@ COMMANDS = {  # words after `lab` -> the command
     "clone": Command(
         "clone",
         "Clone a skill from demonstrations: roll the student out in physics, let it ask, learn the corrections, and again.",
-        "lab clone grasp --demonstrations 5 --rounds 4 --out grasp-clone",
+        "lab clone grasp --rounds 3 --out grasp-clone",
     ),
     "mentor": Command(
         "mentor",

@@ -21,7 +21,7 @@ def clone(
     task: Annotated[str, typer.Option("--task", help="A task that ships, or a .toml file.")] = "toast",
     demonstrations: Annotated[
         int, typer.Option("--demonstrations", min=1, max=10_000, help="Episodes of the teacher at the start.")
-    ] = 5,
+    ] = 15,
     rounds: Annotated[int, typer.Option("--rounds", min=0, max=1000, help="Rounds of asking and learning again.")] = 4,
     questions: Annotated[
         int, typer.Option("--questions", min=1, max=100_000, help="Takeovers in a round, at most.")
@@ -38,6 +38,9 @@ def clone(
     evaluated: Annotated[
         int, typer.Option("--evaluated", min=1, max=100_000, help="Episodes by which each round's student is measured.")
     ] = 30,
+    epochs: Annotated[
+        int, typer.Option("--epochs", min=1, max=100_000, help="Epochs of each student's learning.")
+    ] = 400,
     resume: Annotated[
         Path | None,
         typer.Option("--resume", help="Continue the session in this folder, with its options; more --rounds."),
@@ -70,6 +73,7 @@ def clone(
             rule=rule,
             false_alarms=false_alarms,
             evaluated=evaluated,
+            epochs=epochs,
             seed=seed,
         )
         kept = deferred.KeptCloningOptions(deferred.SkillProblem(task, str(skill), noise), options)

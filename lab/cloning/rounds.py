@@ -8,7 +8,7 @@ import numpy as np
 from annotated_types import Gt, Lt
 from numpy.typing import NDArray
 
-from lab.cloning.student import Student
+from lab.cloning.student import EPOCHS, Student
 from lab.errors import BadInput, check_value, unknown
 from lab.mentor.conformal import Promise
 from lab.mentor.doubts import DOUBTS, UNCALIBRATED
@@ -36,10 +36,10 @@ class CloningOptions:
     takeover_steps: for which the teacher then acts. rule: of the mentor. false_alarms: in which share of the episodes that
     would have succeeded it may ask. calibrated: rollouts without a teacher that set the threshold of a round. episodes: with a
     teacher in a round, at most. every_steps: after so many steps the rule "clock" asks, and "random" on average. evaluated:
-    rollouts by which a student is measured, the same after each round.
+    rollouts by which a student is measured, the same after each round. epochs: of each student's learning.
     """
 
-    demonstrations: int = 5
+    demonstrations: int = 15
     rounds: int = 4
     questions: int = 10
     takeover_steps: int = 10
@@ -49,6 +49,7 @@ class CloningOptions:
     episodes: int = 40
     every_steps: int = 50
     evaluated: int = 30
+    epochs: int = EPOCHS
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -108,14 +109,16 @@ def cloned(
 ) -> Iterator[Cloning]:
     """The session after each round, the first before any question; it goes on from a session that was interrupted."""
     if session is None:
-        student = Student.learn(demonstrations, seed=options.seed)
+        student = Student.learn(demonstrations, seed=options.seed, epochs=options.epochs)
         session = Cloning(demonstrations, student, _mentor(roll_out, demonstrations, [], student, options, 0))
         session.measured.append(_measure(roll_out, session, options))
         yield session
     while len(session.measured) <= options.rounds:
         number = len(session.measured)
         _correct(roll_out, session, options, number)
-        session.student = Student.learn(demonstrations, session.corrections, seed=options.seed + number)
+        session.student = Student.learn(
+            demonstrations, session.corrections, seed=options.seed + number, epochs=options.epochs
+        )
         judge = session.mentor.judge
         session.mentor = _mentor(roll_out, demonstrations, session.corrections, session.student, options, number)
         session.mentor.judge = judge

@@ -22,9 +22,9 @@ from lab.toolbox.policy_file import header_of, ordered
 
 FORMAT = "teaching-lab student 1"
 MOST_BYTES = 50_000_000  # of a student's file
-HIDDEN = (64, 64)  # units of its layers
+HIDDEN = (128, 128)  # units of its layers
 CHUNK = 4  # actions that it plans at each step
-EPOCHS, BATCH = 150, 256
+EPOCHS, BATCH = 400, 256
 _STILL = 1e-6  # standard deviation below which a number is the same in all steps
 
 Array = NDArray[np.float64]
@@ -50,7 +50,6 @@ class Student:
         corrections: Iterable[Episode] = (),
         *,
         seed: int = 0,
-        hidden: Sequence[int] = HIDDEN,
         epochs: int = EPOCHS,
     ) -> Self:
         """A student of all steps of the demonstrations that did not fail, and of the corrected steps of other episodes.
@@ -65,7 +64,7 @@ class Student:
         middle, spread = states.mean(axis=0), states.std(axis=0)
         scale = np.where(spread > _STILL, spread, 1.0)
         network = sklearn.neural_network.MLPRegressor(
-            hidden_layer_sizes=tuple(hidden),
+            hidden_layer_sizes=HIDDEN,
             batch_size=min(BATCH, len(states)),
             max_iter=epochs,
             random_state=seed,

@@ -90,7 +90,8 @@ def report_page(compared: RulesCompared, name: str) -> str:
             f"{compared.window_s:g} s before it; the lead is the median time between them. The threshold of each rule lets it "
             f"ask in {100 * compared.false_alarms:g} % of the stretches in which nobody took over, by all other episodes; the "
             "doubt in an episode is measured by what was learned from others. By chance: what as many alarms at random steps "
-            "reach on average. ROC area: how often a step in the time before a takeover has more doubt than another one (0.5 by chance)."
+            "reach on average. ROC area: how often a step in the time before a takeover has more doubt than another one "
+            "(0.5 by chance)."
         ),
         curves=_embedded(curves_figure(compared)),
         episodes=[

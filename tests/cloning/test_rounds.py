@@ -23,7 +23,7 @@ from lab.mentor.mentor import Mentor
 from lab.recordings.episode import Episode, Recording
 from tests.cloning.conftest import RollOut
 
-FEW = CloningOptions(rounds=2, questions=3, takeover_steps=4, calibrated=9, episodes=6, evaluated=5)
+FEW = CloningOptions(rounds=2, questions=3, takeover_steps=4, calibrated=9, episodes=6, evaluated=5, epochs=60)
 
 
 def narrow(recording: Recording) -> Recording:
