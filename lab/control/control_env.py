@@ -79,8 +79,9 @@ class ControlEnv(gymnasium.Env[Any, Action]):
     ) -> None:
         """task: a file or a name that ships; skill: its name, or that of its sub-task; layout_seed: of the obstacles.
 
-        noise: the standard deviation of a seeded disturbance that is added to each action; seconds: until an episode is
-        cut; None: LEAST_S, and PATHS times what the table's path takes at full speed.
+        noise: the standard deviation of a seeded disturbance of each velocity, as a share of the largest one that is
+        commanded, so that an arm at rest stays at rest; 0.1 is much where a part goes into a slot. seconds: until an episode
+        is cut; None: LEAST_S, and PATHS times what the table's path takes at full speed.
         Raises BadInput.
         """
         for name, value, allowed in (("actions", actions, ACTIONS), ("observations", observations, OBSERVATIONS)):
@@ -143,9 +144,10 @@ class ControlEnv(gymnasium.Env[Any, Action]):
             raise BadInput(
                 f"action {action!r} (ControlEnv): wanted {len(self.action_names)} finite numbers from -1 to 1"
             )
-        if self.noise:
-            asked = np.append(asked[:-1] + self.np_random.normal(0.0, self.noise, len(asked) - 1), asked[-1])
         asked = np.clip(asked, -1.0, 1.0)
+        if self.noise:
+            most = self.noise * float(np.abs(asked[:-1]).max())
+            asked[:-1] = np.clip(asked[:-1] + self.np_random.normal(0.0, most, len(asked) - 1), -1.0, 1.0)
         self._command_fingers(bool(asked[-1] > 0.0))
         self._move(asked[:-1])
         self._steps, self.tool = self._steps + 1, scene.robot.tool()

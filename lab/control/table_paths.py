@@ -12,6 +12,7 @@ from lab.sim.arms.tool_path import COUNTED
 
 GAIN = 5.0  # [1/s] velocity per distance
 FAST_M_S = 1.0  # before the environment's limit
+SLOW_M_S = 0.15  # of a tool that goes down into a slot
 ALIGNED_M, ALIGNED_RAD = 0.003, 0.02  # beside the line on which the tool then goes down, or along cells
 LINE_M = 0.006  # the distance beside a line of cells at which the tool no longer goes along it
 SIDE_M = 0.012  # beside the goal at which a tool below the path's height still goes down
@@ -99,8 +100,7 @@ class TablePaths:
         level = float(self.poses[0, 2]) if self.flat else None
         if level is not None and end[2] < level and _is_beside(here, end, SIDE_M):  # over the goal, or on the way down
             down = _towards(here, end)
-            if not _is_beside(here, end):
-                down[2] = 0.0
+            down[2] = np.clip(down[2], -SLOW_M_S, SLOW_M_S) if _is_beside(here, end) else 0.0
             return down
         if level is not None and here[2] < level - 2 * OVER_M:
             return _up()
