@@ -5,7 +5,7 @@ Source: LeRobot 0.6.1, `lerobot.datasets`. Pictures are decoded when they are as
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import chain, groupby
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput, counted, unknown
-from lab.lazy import av, pyarrow
-from lab.optional import require
 from lab.recordings.episode import Episode, Image, Pictures, Recording
 from lab.recordings.lerobot_info import (
     ACTION,
@@ -56,7 +54,6 @@ def read(folder: Path, episodes: Sequence[int] | None = None) -> Recording:
     features are left out. Cameras are named without "observation.images.".
     Raises BadInput for a missing or damaged file, an unknown episode, or more numbers than MOST_NUMBERS.
     """
-    require(f"'{folder}'", pyarrow, av, extra="recordings")
     info = load_info(folder)
     rows = _rows(info)
     numbers = sorted(rows) if episodes is None else list(episodes)
@@ -67,7 +64,9 @@ def read(folder: Path, episodes: Sequence[int] | None = None) -> Recording:
     steps = sum(row.length for row in chosen)
     width = sum(feature.width for feature in info.features.values() if feature.dtype in NUMBERS)
     if steps * width > MOST_NUMBERS:
-        raise BadInput(f"'{folder}': {steps} steps of {width} numbers: choose fewer episodes, allowed are {MOST_NUMBERS}")
+        raise BadInput(
+            f"'{folder}': {steps} steps of {width} numbers: choose fewer episodes, allowed are {MOST_NUMBERS}"
+        )
     state = next((name for name in (STATE, OTHER_STATE) if name in info.features), STATE)
     for name in (state, ACTION):
         feature = info.features.get(name)
@@ -95,8 +94,11 @@ def _rows(info: Info) -> dict[int, _Row]:
         if table.rows + len(rows) > info.episodes:
             raise BadInput(f"'{path}': more episodes than the {info.episodes} in info.json")
         wanted = ["episode_index", "length", "data/chunk_index", "data/file_index"]
-        places = [[f"videos/{camera}/{what}" for what in ("chunk_index", "file_index", "from_timestamp")] for camera in cameras]
-        values = {name: table.numbers(name, (1,))[:, 0] for name in (*wanted, *sum(places, []))}
+        places = [
+            [f"videos/{camera}/{what}" for what in ("chunk_index", "file_index", "from_timestamp")]
+            for camera in cameras
+        ]
+        values = {name: table.numbers(name, (1,))[:, 0] for name in (*wanted, *chain(*places))}
         for row in range(table.rows):
             number, length, chunk, file = (int(values[name][row]) for name in wanted)
             videos = {}
@@ -150,7 +152,9 @@ def _episode(
         success = bool(columns[SUCCESS].any())
     elif sparse:
         success = bool((columns[REWARD] == 1).any())
-    numbers = columns["task_index"][:, 0].astype(np.int64) if "task_index" in columns else np.zeros(row.length, np.int64)
+    numbers = (
+        columns["task_index"][:, 0].astype(np.int64) if "task_index" in columns else np.zeros(row.length, np.int64)
+    )
     for number in np.unique(numbers).tolist():
         if number not in tasks:
             raise BadInput(f"'{path}': task {number} of episode {row.number} is not in {TASKS}")

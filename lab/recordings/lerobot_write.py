@@ -17,9 +17,7 @@ from numpy.typing import NDArray
 
 from lab.errors import BadInput, WorkFailed, shortened
 from lab.files import draft, write_whole
-from lab.lazy import av, pyarrow
 from lab.operating_system import replace
-from lab.optional import require
 from lab.recordings.episode import Episode, Recording
 from lab.recordings.lerobot_info import (
     ACTION,
@@ -77,7 +75,6 @@ class Writer:
         sizes: FileSizes | None = None,
     ) -> None:
         """Checks the arguments; writes nothing. Raises BadInput if the folder exists."""
-        require("a LeRobot dataset", pyarrow, av, extra="recordings")
         check_free(folder)
         if not 1 <= fps <= MOST_FPS:
             raise BadInput(f"fps {fps}: wanted 1 to {MOST_FPS}")
@@ -146,7 +143,9 @@ class Writer:
         for name, values in episode.extra.items():
             self._check_name(name)
             if name in (*self._features, *self._cameras, SUCCESS, *INDICES) or values.dtype.name not in NUMBERS:
-                raise BadInput(f"extra '{name}' of {values.dtype.name}: wanted numbers, and no name of the dataset's own")
+                raise BadInput(
+                    f"extra '{name}' of {values.dtype.name}: wanted numbers, and no name of the dataset's own"
+                )
             self._features[name] = Feature(values.dtype.name, values.shape[1:] or (1,), None)
         self._features |= _INDEX_TYPES
         self._meta = RowsWriter(self._made(EPISODES_PATH.format(chunk_index=0, file_index=0)))
@@ -197,7 +196,9 @@ class Writer:
             columns[SUCCESS] = last & episode.success
         if columns.keys() != self._features.keys() or set(episode.pictures) != set(self._cameras.values()):
             other = columns.keys() ^ self._features.keys() or set(episode.pictures) ^ set(self._cameras.values())
-            raise BadInput(f"{where}: wanted the features of the first one: {', '.join(sorted(other))} is in one of them alone")
+            raise BadInput(
+                f"{where}: wanted the features of the first one: {', '.join(sorted(other))} is in one of them alone"
+            )
         for name, feature in self._features.items():
             values = columns[name]
             if (values.shape[1:] or (1,)) != feature.shape or values.dtype.name != feature.dtype:
@@ -258,7 +259,9 @@ class Writer:
 
     def _close_files(self, *, complete: bool) -> None:
         """Closes the files that are open; the errors of a dataset that is thrown away do not matter."""
-        closing = [*self._videos.values(), *([self._data] if self._data else []), *([self._meta] if self._begun else [])]
+        closing: list[VideoWriter | NumbersWriter | RowsWriter] = [*self._videos.values()]
+        closing += [self._data] if self._data is not None else []
+        closing += [self._meta] if self._begun else []
         if complete:
             self._write_rows()
         for file in closing:
