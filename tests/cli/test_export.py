@@ -86,10 +86,18 @@ def test_a_dataset_is_written_read_back_and_told(lab: Lab, run: Path) -> None:
         "episodes": 1,
         "fps": 10,
     }
-    assert (ran.json["equal"], ran.json["faults"], ran.json["corrected_steps"], ran.json["pictures"]) == (True, [], 0, False)
+    assert (ran.json["equal"], ran.json["faults"], ran.json["corrected_steps"], ran.json["pictures"]) == (
+        True,
+        [],
+        0,
+        False,
+    )
     assert json.loads((run / "lerobot/meta/info.json").read_text(encoding="utf-8"))["total_frames"] == ran.json["steps"]
     ran = lab("export", str(run), "--format", "lerobot", "--pictures", "0")
-    assert (ran.code, ran.err) == (2, f"lab: '{run / 'lerobot'}': it exists already; a dataset is written to a new folder\n")
+    assert (ran.code, ran.err) == (
+        2,
+        f"lab: '{run / 'lerobot'}': it exists already; a dataset is written to a new folder\n",
+    )
     ran = lab("export", str(run), "--format", "lerobot", "--pictures", "0", "--out", "there")
     assert ran.out.splitlines()[1] == "read back: states, actions and tasks equal; no pictures"
 

@@ -1,4 +1,4 @@
-"""A kept run seen again: the film's pictures are those of the scene in physics, and a person's motions are told by the journal."""
+"""A kept run seen again: its pictures are those of the scene in physics, and the journal tells a person's motions."""
 
 from pathlib import Path
 
@@ -59,7 +59,9 @@ def test_its_pictures_are_those_that_the_camera_took_in_physics(tmp_path: Path) 
         pictures = list(found)
         for own, other in ((first, pictures[0]), (first, pictures[1]), (second, pictures[3]), (second, pictures[4])):
             apart = np.abs(own.astype(int) - other)
-            assert (apart > 8).any(axis=2).mean() < 0.005  # an edge may fall on the pixel beside: the frames are rounded
+            assert (apart > 8).any(
+                axis=2
+            ).mean() < 0.005  # an edge may fall on the pixel beside: the frames are rounded
         assert np.abs(pictures[2].astype(int) - first).mean() > 0.5  # between the two the arm is on its way
         assert np.array_equal(found[1], pictures[1])
 
