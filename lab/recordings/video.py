@@ -71,6 +71,8 @@ class VideoPictures:
             if not file.streams.video:
                 raise BadInput(f"'{self.path}': there is no video in it")
             stream = file.streams.video[0]
+            if stream.codec_context is None:
+                raise BadInput(f"'{self.path}': a video of an unknown codec")
             size = stream.codec_context.width * stream.codec_context.height
             if size > MOST_PIXELS:
                 raise BadInput(f"'{self.path}': pictures of {size} pixels: allowed are {MOST_PIXELS}")

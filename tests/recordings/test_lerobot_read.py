@@ -176,6 +176,7 @@ def test_a_damaged_dataset_is_refused_in_one_line(ours: Path, damage: Damage, sa
     [
         (lambda f: (f / VIDEO).write_bytes(b"no video"), "cannot be decoded as a video"),
         (lambda f: (f / VIDEO).write_bytes((f / VIDEO).read_bytes()[:400]), "cannot be decoded as a video"),
+        (lambda f: (f / VIDEO).write_bytes((f / VIDEO).read_bytes().replace(b"avc1", b"zzzz")), "of an unknown codec"),
         (
             lambda f: column(f, EPISODES, "videos/observation.images.top/from_timestamp", [0.0, 9.0]),
             "no picture at 9.000 s",
