@@ -37,8 +37,9 @@ if TYPE_CHECKING:
     from lab.cloning.kept_cloning import rounds_of
     from lab.cloning.rounds import CloningOptions
     from lab.cloning.skill_problem import SkillProblem
-    from lab.export import FORMATS
+    from lab.export import FORMATS, DatasetFormat
     from lab.export.commands import Path as Lines
+    from lab.export.lerobot import RunRecord
     from lab.export.play import deviation
     from lab.export.program import POSITIONS, Options, Program
     from lab.files import check_out, tasks_folder, write_whole
@@ -64,6 +65,7 @@ if TYPE_CHECKING:
     from lab.production.publication import CARD, publish, write_card
     from lab.production.run import run as run_task
     from lab.production.run_advice import RunAdvice
+    from lab.production.run_film import RunFilm, by_hand_s
     from lab.production.run_journal import RunJournal, is_run, replayed_run
     from lab.production.run_options import RunOptions, begun, kept_task
     from lab.production.run_options import gone_on as run_gone_on
@@ -200,9 +202,10 @@ TABLE = {
     ),
     "lab.cloning.rounds": ("CloningOptions",),
     "lab.cloning.skill_problem": ("SkillProblem",),
-    "lab.export": ("FORMATS",),
+    "lab.export": ("FORMATS", "DatasetFormat"),
     "lab.export.commands": ("Path as Lines",),
     "lab.export.program": ("Options", "POSITIONS", "Program"),
+    "lab.export.lerobot": ("RunRecord",),
     "lab.export.play": ("deviation",),
     "lab.files": ("check_out", "tasks_folder", "write_whole"),
     "lab.gym": ("parse_name",),
@@ -227,6 +230,7 @@ TABLE = {
     "lab.production.publication": ("CARD", "publish", "write_card"),
     "lab.production.run": ("run as run_task",),
     "lab.production.run_advice": ("RunAdvice",),
+    "lab.production.run_film": ("RunFilm", "by_hand_s"),
     "lab.production.run_journal": ("is_run", "replayed_run", "RunJournal"),
     "lab.production.run_options": ("begun", "kept_task", "gone_on as run_gone_on", "RunOptions"),
     "lab.seat.language_model": ("language_models",),

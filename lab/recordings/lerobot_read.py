@@ -5,7 +5,7 @@ Source: LeRobot 0.6.1, `lerobot.datasets`. Pictures are decoded when they are as
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import chain, groupby, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput, counted, unknown
-from lab.lazy import av, pyarrow
-from lab.optional import require
 from lab.recordings.episode import Episode, Image, Pictures, Recording
 from lab.recordings.lerobot_info import (
     ACTION,
@@ -56,7 +54,6 @@ def read(folder: Path, episodes: Sequence[int] | None = None) -> Recording:
     features are left out. Cameras are named without "observation.images.".
     Raises BadInput for a missing or damaged file, an unknown episode, or more numbers than MOST_NUMBERS.
     """
-    require(f"'{folder}'", pyarrow, av, extra="recordings")
     info = load_info(folder)
     rows = _rows(info)
     numbers = sorted(rows) if episodes is None else list(episodes)
@@ -101,7 +98,7 @@ def _rows(info: Info) -> dict[int, _Row]:
             [f"videos/{camera}/{what}" for what in ("chunk_index", "file_index", "from_timestamp")]
             for camera in cameras
         ]
-        values = {name: table.numbers(name, (1,))[:, 0] for name in (*wanted, *sum(places, []))}
+        values = {name: table.numbers(name, (1,))[:, 0] for name in (*wanted, *chain(*places))}
         for row in range(table.rows):
             number, length, chunk, file = (int(values[name][row]) for name in wanted)
             videos = {}
@@ -122,17 +119,34 @@ def _columns(info: Info, chosen: Sequence[_Row]) -> Iterator[tuple[int, tuple[di
     """By the episode's number: the columns of its steps, the file they are in, and its first row there."""
     features = {name: feature for name, feature in info.features.items() if feature.dtype in NUMBERS}
     features = {name: feature for name, feature in features.items() if name not in ("index", "frame_index")}
-    for file, rows in groupby(sorted(chosen, key=lambda row: row.file), key=lambda row: row.file):
-        table = ParquetTable(info.file(info.data_path, *file))
-        owners = table.numbers("episode_index", (1,))[:, 0]
+    for file, group in groupby(sorted(chosen, key=lambda row: row.file), key=lambda row: row.file):
+        table, rows = ParquetTable(info.file(info.data_path, *file)), list(group)
+        firsts = _first_rows(table, rows)
+        start = min(firsts.values())
+        end = max(firsts[row.number] + row.length for row in rows)
+        read = {name: table.numbers(name, feature.shape, start, end) for name, feature in features.items()}
         for row in rows:
-            own = np.flatnonzero(owners == row.number)
-            if len(own) != row.length or (len(own) and own[-1] - own[0] + 1 != len(own)):
-                where = f"'{table.path}': episode {row.number}"
-                raise BadInput(f"{where}: {len(own)} rows of {row.length}: wanted all of them, one after another")
-            first = int(own[0]) if len(own) else 0
-            read = {name: table.numbers(name, f.shape, first, first + row.length) for name, f in features.items()}
-            yield row.number, (read, table.path, first)
+            first = firsts[row.number]
+            own = slice(first - start, first - start + row.length)
+            yield row.number, ({name: values[own].copy() for name, values in read.items()}, table.path, first)
+
+
+def _first_rows(table: ParquetTable, rows: Sequence[_Row]) -> dict[int, int]:
+    """The first row of each episode in its file, by the episode's number."""
+    owners = table.numbers("episode_index", (1,))[:, 0]
+    edges = (
+        np.flatnonzero(np.concatenate([[True], owners[1:] != owners[:-1], [True]])) if len(owners) else np.zeros(1, int)
+    )
+    runs: dict[int, list[tuple[int, int]]] = {}
+    for first, after in pairwise(edges.tolist()):
+        runs.setdefault(int(owners[first]), []).append((first, after - first))
+    for row in rows:
+        own = runs.setdefault(row.number, [] if row.length else [(0, 0)])
+        if [length for _, length in own] != [row.length]:
+            found = ", ".join(str(length) for _, length in own[:3]) or "none"
+            where = f"'{table.path}': episode {row.number}"
+            raise BadInput(f"{where}: {found} of its {row.length} rows: wanted all of them, one after another")
+    return {row.number: runs[row.number][0][0] for row in rows}
 
 
 def _episode(

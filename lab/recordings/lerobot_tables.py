@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from lab.errors import BadInput, WorkFailed, shortened, unknown
 from lab.lazy import pyarrow
+from lab.optional import require
 from lab.recordings.lerobot_info import NUMBERS, Feature
 
 MOST_BYTES = 4 << 30  # of what is unpacked at once
@@ -36,6 +37,7 @@ class ParquetTable:
 
     def __init__(self, path: Path) -> None:
         """Reads the file's description."""
+        require(f"'{path}'", pyarrow, extra="recordings")
         self.path = path
         with _readable(path):
             self._file: Any = pyarrow.parquet.ParquetFile(path)
@@ -160,6 +162,7 @@ class NumbersWriter:
 
     def __init__(self, path: Path, features: Mapping[str, Feature]) -> None:
         """Creates the file; features that are no numbers are left out. Raises WorkFailed if it cannot be written."""
+        require(f"'{path}'", pyarrow, extra="recordings")
         self.path, self.rows = path, 0
         kinds = {name: _typed(feature) for name, feature in features.items() if feature.dtype in NUMBERS}
         self._schema = pyarrow.schema(kinds.items())
@@ -189,7 +192,9 @@ class RowsWriter:
 
     def __init__(self, path: Path) -> None:
         """Nothing is written before the first rows."""
-        self.path, self._writer, self._schema = path, None, None
+        self.path = path
+        self._writer: Any = None
+        self._schema: Any = None
 
     def add(self, rows: Sequence[Mapping[str, Any]]) -> None:
         """Appends rows. Raises WorkFailed if the file cannot be written."""

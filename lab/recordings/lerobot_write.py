@@ -17,9 +17,7 @@ from numpy.typing import NDArray
 
 from lab.errors import BadInput, WorkFailed, shortened
 from lab.files import draft, write_whole
-from lab.lazy import av, pyarrow
 from lab.operating_system import replace
-from lab.optional import require
 from lab.recordings.episode import Episode, Recording
 from lab.recordings.lerobot_info import (
     ACTION,
@@ -77,7 +75,6 @@ class Writer:
         sizes: FileSizes | None = None,
     ) -> None:
         """Checks the arguments; writes nothing. Raises BadInput if the folder exists."""
-        require("a LeRobot dataset", pyarrow, av, extra="recordings")
         check_free(folder)
         if not 1 <= fps <= MOST_FPS:
             raise BadInput(f"fps {fps}: wanted 1 to {MOST_FPS}")
@@ -262,11 +259,9 @@ class Writer:
 
     def _close_files(self, *, complete: bool) -> None:
         """Closes the files that are open; the errors of a dataset that is thrown away do not matter."""
-        closing = [
-            *self._videos.values(),
-            *([self._data] if self._data else []),
-            *([self._meta] if self._begun else []),
-        ]
+        closing: list[VideoWriter | NumbersWriter | RowsWriter] = [*self._videos.values()]
+        closing += [self._data] if self._data is not None else []
+        closing += [self._meta] if self._begun else []
         if complete:
             self._write_rows()
         for file in closing:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from lab.errors import BadInput, WorkFailed
 from lab.lazy import av
+from lab.optional import require
 from lab.recordings.episode import Image
 
 MOST_PIXELS = 1 << 25  # of a picture that is decoded: 8,192 x 4,096
@@ -65,14 +66,17 @@ class VideoPictures:
         """The pictures from a step on."""
         if not len(self):
             return
+        require(f"'{self.path}'", av, extra="recordings")
         with _readable(self.path), av.open(str(self.path)) as file:
             if not file.streams.video:
                 raise BadInput(f"'{self.path}': there is no video in it")
             stream = file.streams.video[0]
+            if stream.codec_context is None:
+                raise BadInput(f"'{self.path}': a video of an unknown codec")
             size = stream.codec_context.width * stream.codec_context.height
             if size > MOST_PIXELS:
                 raise BadInput(f"'{self.path}': pictures of {size} pixels: allowed are {MOST_PIXELS}")
-            tick = float(stream.time_base)
+            tick = float(stream.time_base or 1)
             file.seek(max(0, round(self.times_s[first] / tick) - 1), stream=stream, backward=True)
             step = first
             for frame in file.decode(stream):
@@ -93,8 +97,9 @@ def decoded_picture(content: bytes, where: str) -> Image:
     kind = "png" if content.startswith(b"\x89PNG\r\n\x1a\n") else "mjpeg" if content.startswith(b"\xff\xd8") else None
     if kind is None:
         raise BadInput(f"{where}: a picture that is neither PNG nor JPEG")
+    require(where, av, extra="recordings")
     try:
-        with av.open(BytesIO(content), format=f"{kind.removeprefix('m')}_pipe") as file:
+        with av.open(BytesIO(content), mode="r", format=f"{kind.removeprefix('m')}_pipe") as file:
             context = file.streams.video[0].codec_context
             if context.width * context.height > MOST_PIXELS:
                 raise BadInput(f"{where}: a picture of {context.width} x {context.height}: too large")
@@ -110,11 +115,13 @@ class VideoWriter:
         """Creates the file. Raises WorkFailed if it cannot be written."""
         self.path, self.frames, self.bytes = path, 0, 0
         self._size = (height, width, 3)
+        require(f"'{path}'", av, extra="recordings")
         options = {"crf": str(QUALITY), "g": str(KEYFRAME_EVERY), "bf": "0", "threads": "1"}
         with self._writing():
             self._file: Any = av.open(str(path), "w", format="mp4")
-            self._stream = self._file.add_stream(CODEC, rate=fps, options=options)
-            self._stream.width, self._stream.height, self._stream.pix_fmt = width, height, PIXELS
+            stream: Any = self._file.add_stream(CODEC, rate=fps, options=options)
+            stream.width, stream.height, stream.pix_fmt = width, height, PIXELS
+            self._stream = stream
 
     @contextmanager
     def _writing(self) -> Iterator[None]:

@@ -167,6 +167,13 @@ class World:
         )
         self._fixed(name, -1, visual, position, NO_TURN, Shape("cylinder", (radius, height), None, rgba))
 
+    def show(self, name: str, looks: Sequence[Shape]) -> None:
+        """A body at the origin that is only seen, and collides with nothing; `put` moves it."""
+        with silence():
+            visual = seen_of(self._p, self._call, looks)
+        number = self._call("createMultiBody", 0, -1, visual, [0.0, 0.0, 0.0], list(NO_TURN))
+        self._add(name, _Entry(number, False, ((0.0, 0.0, 0.0), NO_TURN), looks={"": tuple(looks)}))
+
     def _fixed(self, name: str, shape: int, visual: int, position: Position, turn: Position, look: Shape) -> None:
         number = self._call("createMultiBody", 0, shape, visual, list(position), list(turn))
         self._add(name, _Entry(number, False, (tuple(position), tuple(turn)), looks={"": (look,)}))
@@ -179,7 +186,7 @@ class World:
         entry = _Entry(-1, True, (tuple(position), turn), looks={"": shape.looks}, turn=shape.turn)
         body = self._turned(turn, shape.turn)
         with silence():
-            solid, seen = solid_of(self._p, self._call, shape), seen_of(self._p, self._call, shape)
+            solid, seen = solid_of(self._p, self._call, shape), seen_of(self._p, self._call, shape.looks, shape.turn)
             entry.number = self._call("createMultiBody", mass_kg, solid, seen, list(position), list(body))
         moments, rolling = (
             [float(f"{moment * mass_kg:.12g}") for moment in shape.inertia_m2],
