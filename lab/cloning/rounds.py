@@ -100,8 +100,8 @@ class Cloning:
 
 def seeds_for(options: CloningOptions, purpose: int, count: int, in_round: int = 0) -> list[int]:
     """The seeds of the episodes for a purpose; those of different purposes and rounds are drawn apart."""
-    drawn = np.random.SeedSequence([options.seed, purpose, in_round]).generate_state(count)
-    return [int(seed) for seed in drawn]
+    rng = np.random.default_rng([options.seed, purpose, in_round])
+    return [int(seed) for seed in rng.integers(2**32, size=count)]
 
 
 def cloned(

@@ -121,7 +121,8 @@ def _out_of_fold(episodes: Sequence[Episode], name: str, window: int, seed: int)
     """The doubt (n,) at each step of each episode, by what was learned from the episodes of the other folds."""
     doubts: list[Any] = [None] * len(episodes)
     folds = min(FOLDS, len(episodes))
-    fold_of = np.random.default_rng(seed).permutation(len(episodes)) % folds
+    order = np.random.default_rng(seed)
+    fold_of = order.permutation(len(episodes)) % folds
     for fold in range(folds):
         others = [episode for episode, of in zip(episodes, fold_of, strict=True) if of != fold]
         rng = np.random.default_rng([seed, fold])
