@@ -57,7 +57,7 @@ def task_words(transfer: ProgramTransfer) -> str:
 
 
 def episodes(program: Program, options: Options, record: RunRecord) -> Iterator[Episode]:
-    """The episodes of a run, from when the robot leaves for a part until it has set it down, at `options.fps` steps a second.
+    """The episodes of a run, a transfer each, from when the part before was set down, at `options.fps` steps a second.
 
     States (n, k + 1): the joints' targets [rad], to which physics kept the arm, and whether the gripper was told to close (1)
     or open (0). Actions: the same one step later. A step was corrected if a person moved the arm then. Raises BadInput for a
@@ -66,11 +66,12 @@ def episodes(program: Program, options: Options, record: RunRecord) -> Iterator[
     transfers = program.carried.transfers
     if not transfers or not len(program.joints):
         raise BadInput("--format lerobot: the run has no transfer: wanted one that the robot carried out")
-    if sum(transfer.drop_s - transfer.leave_s for transfer in transfers) * options.fps > MOST_STEPS:
+    if transfers[-1].drop_s * options.fps > MOST_STEPS:
         raise BadInput(f"--fps {options.fps}: more than {MOST_STEPS} steps: wanted fewer a second")
-    for transfer in transfers:
-        steps = max(1, int((transfer.drop_s - transfer.leave_s) * options.fps + 1e-6) + 1)
-        times_s = transfer.leave_s + np.arange(steps + 1) / options.fps
+    begins_s = [0.0, *(transfer.drop_s for transfer in transfers)]
+    for begin_s, transfer in zip(begins_s, transfers, strict=False):
+        steps = max(0, int((transfer.drop_s - begin_s) * options.fps + 1e-6)) + 1
+        times_s = begin_s + np.arange(steps + 1) / options.fps
         rows = _joints_and_gripper(program, times_s)
         corrected = np.zeros(steps, np.bool_)
         for from_s, until_s in record.by_hand_s:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lab.audit.tracks import FILE, read_tracks
 from lab.errors import BadInput
-from lab.production.operation.commands import COMMANDS, OPERATOR
+from lab.production.operation.commands import COMMANDS
 from lab.production.run_journal import Commanded, Met, Moved, Stopped, read_run
 from lab.production.run_options import kept_task
 from lab.sim.scene.places import Layout
@@ -34,7 +34,7 @@ def by_hand_s(folder: Path) -> tuple[tuple[float, float], ...]:
     ends = [later.step for later in timed[1:]] + [2**53]
     spans = []
     for entry, end in zip(timed, ends, strict=True):
-        if isinstance(entry, Commanded) and entry.by == OPERATOR and not entry.refused:
+        if isinstance(entry, Commanded) and not entry.refused:
             word = entry.words.partition(" ")[0]
             if word in COMMANDS and COMMANDS[word].how == "by hand" and word not in LEARNED and end > entry.step:
                 spans.append((entry.step * TIME_STEP, end * TIME_STEP))

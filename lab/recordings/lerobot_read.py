@@ -25,7 +25,7 @@ from lab.recordings.lerobot_info import (
     Info,
     load_info,
 )
-from lab.recordings.lerobot_tables import ParquetTable, task_texts
+from lab.recordings.lerobot_tables import ParquetTable, task_texts, whole_numbers
 from lab.recordings.video import VideoPictures, decoded_picture
 
 INTERVENTIONS = ("intervention", "complementary_info.is_intervention")  # of its rollout by DAgger; of HIL-SERL
@@ -94,19 +94,17 @@ def _rows(info: Info) -> dict[int, _Row]:
         if table.rows + len(rows) > info.episodes:
             raise BadInput(f"'{path}': more episodes than the {info.episodes} in info.json")
         wanted = ["episode_index", "length", "data/chunk_index", "data/file_index"]
-        places = [
-            [f"videos/{camera}/{what}" for what in ("chunk_index", "file_index", "from_timestamp")]
-            for camera in cameras
-        ]
-        values = {name: table.numbers(name, (1,))[:, 0] for name in (*wanted, *chain(*places))}
+        places = {camera: [f"videos/{camera}/{what}_index" for what in ("chunk", "file")] for camera in cameras}
+        whole = {name: table.whole_numbers(name).tolist() for name in (*wanted, *chain(*places.values()))}
+        begins = {camera: table.numbers(f"videos/{camera}/from_timestamp", (1,))[:, 0] for camera in cameras}
+        if not all(np.isfinite(times_s).all() for times_s in begins.values()):
+            raise BadInput(f"'{path}': from_timestamp of a video: wanted seconds")
         for row in range(table.rows):
-            number, length, chunk, file = (int(values[name][row]) for name in wanted)
-            videos = {}
-            for camera, names in zip(cameras, places, strict=True):
-                video_chunk, video_file, from_s = (float(values[name][row]) for name in names)
-                if not np.isfinite([video_chunk, video_file, from_s]).all():
-                    raise BadInput(f"'{path}': episode {number}: the place of its video of '{camera}' is no number")
-                videos[camera] = int(video_chunk), int(video_file), from_s
+            number, length, chunk, file = (whole[name][row] for name in wanted)
+            videos = {
+                camera: (whole[of_chunk][row], whole[of_file][row], float(begins[camera][row]))
+                for camera, (of_chunk, of_file) in places.items()
+            }
             if number in rows or number < 0 or length < 0:
                 raise BadInput(f"'{path}': episode {number} of {length} steps: wanted each number once, from 0 on")
             rows[number] = _Row(number, length, (chunk, file), videos)
@@ -133,7 +131,7 @@ def _columns(info: Info, chosen: Sequence[_Row]) -> Iterator[tuple[int, tuple[di
 
 def _first_rows(table: ParquetTable, rows: Sequence[_Row]) -> dict[int, int]:
     """The first row of each episode in its file, by the episode's number."""
-    owners = table.numbers("episode_index", (1,))[:, 0]
+    owners = table.whole_numbers("episode_index")
     edges = (
         np.flatnonzero(np.concatenate([[True], owners[1:] != owners[:-1], [True]])) if len(owners) else np.zeros(1, int)
     )
@@ -169,9 +167,9 @@ def _episode(
         success = bool(columns[SUCCESS].any())
     elif sparse:
         success = bool((columns[REWARD] == 1).any())
-    numbers = (
-        columns["task_index"][:, 0].astype(np.int64) if "task_index" in columns else np.zeros(row.length, np.int64)
-    )
+    numbers = np.zeros(row.length, np.int64)
+    if "task_index" in columns:
+        numbers = whole_numbers(columns["task_index"].reshape(-1), f"'{path}': column 'task_index'")
     for number in np.unique(numbers).tolist():
         if number not in tasks:
             raise BadInput(f"'{path}': task {number} of episode {row.number} is not in {TASKS}")

@@ -16,6 +16,7 @@ from lab.recordings.lerobot_info import NUMBERS, Feature
 
 MOST_BYTES = 4 << 30  # of what is unpacked at once
 MOST_TEXT_BYTES = 100_000_000
+MOST_WHOLE = 2**53  # up to which a float holds each whole number
 BATCH = 16  # pictures that are unpacked at once
 
 Columns = Mapping[str, NDArray[np.generic]]
@@ -93,6 +94,10 @@ class ParquetTable:
                 raise BadInput(f"{where}: wanted {' x '.join(map(str, shape))} numbers in each row")
         return values.reshape(after - first, *shape)
 
+    def whole_numbers(self, name: str) -> NDArray[np.int64]:
+        """The whole numbers (n,) of a column."""
+        return whole_numbers(self.numbers(name, (1,))[:, 0], f"'{self.path}': column '{name}'")
+
     def texts(self, name: str) -> list[str]:
         """The texts of a column."""
         with _readable(self.path):
@@ -121,12 +126,18 @@ class ParquetTable:
                         return
 
 
+def whole_numbers(values: NDArray[Any], where: str) -> NDArray[np.int64]:
+    """The values as whole numbers. BadInput, which begins with `where`, if one is none, or too large."""
+    if not (np.abs(values.astype(np.float64)) <= MOST_WHOLE).all() or (values != np.floor(values)).any():
+        raise BadInput(f"{where}: wanted whole numbers")
+    return values.astype(np.int64)
+
+
 def task_texts(path: Path) -> dict[int, str]:
     """The texts of a dataset's tasks, by number."""
     table = ParquetTable(path)
     column = next((name for name in ("task", "__index_level_0__") if name in table.names), "task")
-    numbers = table.numbers("task_index", (1,))[:, 0]
-    return dict(zip(numbers.astype(int).tolist(), table.texts(column), strict=True))
+    return dict(zip(table.whole_numbers("task_index").tolist(), table.texts(column), strict=True))
 
 
 # ---- written -------------------------------------------------------------------------------------------------------------

@@ -157,6 +157,13 @@ Damage = Callable[[Path], object]
         (lambda f: column(f, DATA, "episode_index", [0, 1, 0, 1, 0, 1]), "wanted all of them, one after another"),
         (lambda f: column(f, DATA, "episode_index", [0] * 6), "episode 0: 6 of its 3 rows"),
         (lambda f: column(f, DATA, "task_index", [7] * 6), "task 7 of episode 0 is not in meta/tasks.parquet"),
+        (lambda f: column(f, DATA, "task_index", [0.0, 0.5] * 3), "column 'task_index': wanted whole numbers"),
+        (
+            lambda f: column(f, DATA, "episode_index", [float("nan")] * 6),
+            "column 'episode_index': wanted whole numbers",
+        ),
+        (lambda f: column(f, EPISODES, "length", [3.0, float("nan")]), "column 'length': wanted whole numbers"),
+        (lambda f: column(f, TASKS, "task_index", [10**18]), "column 'task_index': wanted whole numbers"),
         (lambda f: column(f, DATA, "timestamp", [2.0, 1.0, 0.0] * 2), "timestamp: wanted seconds that do not run back"),
         (lambda f: column(f, EPISODES, "length", [3, -3]), "episode 1 of -3 steps"),
         (lambda f: column(f, EPISODES, "episode_index", [0, 0]), "wanted each number once"),
