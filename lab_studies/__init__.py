@@ -113,6 +113,12 @@ STUDIES: dict[str, Study] = {
         sessions=10,
         least=2,
     ),
+    "clone": Study(
+        "When a clone should ask: success by questions in three skills; takes hours",
+        _In("comparisons.clone", "clone"),
+        sessions=20,
+        least=2,
+    ),
     "mentor": Study(
         "A mentor for other people's policies: when they should ask, at equal questions",
         _In("comparisons.mentor", "mentor"),

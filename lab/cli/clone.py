@@ -33,7 +33,10 @@ def clone(
         float, typer.Option("--false-alarms", help="Share of the episodes that would succeed in which it may ask.")
     ] = 0.2,
     noise: Annotated[
-        float, typer.Option("--noise", min=0.0, max=1.0, help="Standard deviation of the disturbance of each action.")
+        float,
+        typer.Option(
+            "--noise", min=0.0, max=1.0, help="Disturbance of each action: its share of the commanded velocity."
+        ),
     ] = 0.1,
     evaluated: Annotated[
         int, typer.Option("--evaluated", min=1, max=100_000, help="Episodes by which each round's student is measured.")

@@ -105,11 +105,18 @@ def seeds_for(options: CloningOptions, purpose: int, count: int, in_round: int =
 
 
 def cloned(
-    roll_out: RollsOut, demonstrations: Recording, options: CloningOptions, session: Cloning | None = None
+    roll_out: RollsOut,
+    demonstrations: Recording,
+    options: CloningOptions,
+    session: Cloning | None = None,
+    first: Student | None = None,
 ) -> Iterator[Cloning]:
-    """The session after each round, the first before any question; it goes on from a session that was interrupted."""
+    """The session after each round, the first before any question.
+
+    session: which was interrupted, and goes on; first: the student of the demonstrations alone, if it is there already.
+    """
     if session is None:
-        student = Student.learn(demonstrations, seed=options.seed, epochs=options.epochs)
+        student = first or Student.learn(demonstrations, seed=options.seed, epochs=options.epochs)
         session = Cloning(demonstrations, student, _mentor(roll_out, demonstrations, [], student, options, 0))
         session.measured.append(_measure(roll_out, session, options))
         yield session

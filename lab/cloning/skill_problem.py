@@ -13,14 +13,14 @@ from lab.recordings.episode import Episode, Recording
 class SkillProblem:
     """A skill and the conditions of its episodes; `SkillProblem("toast", "grasp")(policy, seed)` is an episode.
 
-    noise: the standard deviation of the disturbance of each action; seconds: until an episode is cut. Raises BadInput when first
-    used.
+    noise: the standard deviation of the disturbance of each action, as a share of the commanded velocity; seconds: until an
+    episode is cut; None: as the skill takes. Raises BadInput when first used.
     """
 
     task: str = "toast"
     skill: str = "grasp"
     noise: float = 0.1
-    seconds: float = 15.0
+    seconds: float | None = None
 
     @cached_property
     def env(self) -> ControlEnv:

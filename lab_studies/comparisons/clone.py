@@ -1,0 +1,200 @@
+"""When a clone should ask: rules of doubt against asking at random, at fixed times, always and never, at equal questions."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pydantic import TypeAdapter
+
+from lab.cloning.rounds import Asks, CloningOptions, Measured, Policy, RollsOut, cloned
+from lab.cloning.skill_problem import SkillProblem
+from lab.cloning.student import Student
+from lab.recordings.episode import Episode, Recording
+from lab.studies.charts import legend_below
+from lab.studies.findings import Findings, Row, mean_row, row, those
+from lab.studies.runner import Job, seeds_of
+from lab.view.canvas import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, RED, SKY, picture_bytes
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SKILLS = ("grasp", "place", "insert")
+DOUBTING = ("distance", "discrepancy", "ensemble", "chunk", "progress", "failure")
+RIVALS = ("random", "clock", "always", "never")
+OPTIONS = CloningOptions(rounds=3, questions=12, calibrated=15, evaluated=20, false_alarms=0.2)
+NOISE = 0.1  # of each action, as a share of the commanded velocity
+GOAL = 0.9  # the share of successes whose questions are counted
+MEASURES = (
+    "A student is cloned from {demonstrations} demonstrations of a skill. In each of {rounds} rounds it may ask {questions} times; "
+    "the scripted teacher then takes over for {takeover_steps} steps of 0.1 s, and the student learns the corrections. "
+    "success_percent: of {evaluated} episodes without a teacher, the same after each round and in nothing else used. questions: so "
+    "far. gain_percent: success_percent above what asking at random reaches with as many questions in the same session "
+    "(interpolated linearly). warned_percent: failures in which the rule would have asked; false_alarms_percent: successes in which "
+    "it would have asked, of which {false_alarms:.0%} were allowed, where the threshold was promised. lead_s: from the first "
+    "question to the end of a failed episode. questions_to_90: until a round reaches 90 %; a session that does not counts with all "
+    "its questions and one more."
+)
+
+
+@dataclass(frozen=True)
+class Session:
+    """One session of every rule, which all begin with the same student."""
+
+    skill: str
+    seed: int
+
+
+Results = dict[str, list[Measured]]  # by rule: after each round
+_RESULTS = TypeAdapter(dict[str, list[Measured]])
+
+
+def clone(job: Job, reading: Mapping[str, Any]) -> Findings:
+    """The results of every rule and skill; a session is a seed, and the reading has no effect."""
+    sessions = [
+        Session(skill, int(seed % 2**31))
+        for skill in SKILLS
+        for seed in seeds_of(_Skill(skill), job.sessions, job.seed)
+    ]
+    done: dict[Session, Results] = job.kept_as(_kept)
+    missing = [session for session in sessions if session not in done]
+    job.progress(len(sessions) - len(missing), len(sessions))
+    for session, results in job.computed(results_of, missing, most=1):
+        done[session] = results
+        job.keep(asdict(session) | {"results": _RESULTS.dump_python(results, mode="json")})
+        job.progress(len(done), len(sessions))
+    rows = [
+        one
+        for skill in SKILLS
+        for one in rows_of(skill, [done[session] for session in sessions if session.skill == skill])
+    ]
+    says: Row = {}
+    for skill in SKILLS:
+        for rule in (*DOUBTING, "clock"):
+            (gain,) = those(rows, skill=skill, rule=rule, round=OPTIONS.rounds, measure="gain_percent")
+            low, high = gain["ci95"]
+            says[f"{skill}: {rule} over random at equal questions [points of success]"] = (
+                f"{gain['value']:.1f} ({low:.1f} to {high:.1f})"
+            )
+    pictures = {f"Success against questions, {skill}": _picture(those(rows, skill=skill)) for skill in SKILLS}
+    return Findings(rows, says, pictures, (MEASURES.format(**asdict(OPTIONS)),))
+
+
+@dataclass(frozen=True)
+class _Skill:
+    """The setting from which the seeds of its sessions are drawn."""
+
+    skill: str
+
+
+def _kept(record: Any) -> tuple[Session, Results]:
+    results = _RESULTS.validate_python(record.pop("results"), strict=False)
+    return Session(**record), results
+
+
+def results_of(session: Session) -> Results:
+    """The measurements of every rule in a session in physics."""
+    problem = SkillProblem("toast", session.skill, NOISE)
+    options = replace(OPTIONS, seed=session.seed)
+    try:
+        return rules_tried(problem, problem.demonstrated(options), options)
+    finally:
+        problem.close()
+
+
+def rules_tried(roll_out: RollsOut, demonstrations: Recording, options: CloningOptions) -> Results:
+    """The measurements of every rule, each of which begins with the same student."""
+    alone = _Remembered(roll_out)
+    first = Student.learn(demonstrations, seed=options.seed, epochs=options.epochs)
+    results = {}
+    for rule in (*DOUBTING, *RIVALS):
+        *_, last = cloned(alone, demonstrations, replace(options, rule=rule), first=first)
+        results[rule] = last.measured
+    return results
+
+
+class _Remembered:
+    """Rollouts without a teacher, made once for each student and seed."""
+
+    def __init__(self, roll_out: RollsOut) -> None:
+        self.roll_out = roll_out
+        self._known: dict[tuple[int, int], tuple[Policy, Episode]] = {}  # the policy stays, and so does its id
+
+    def __call__(self, policy: Policy, seed: int, *, asks: Asks | None = None) -> Episode:
+        if asks is not None:
+            return self.roll_out(policy, seed, asks=asks)
+        key = id(policy), seed
+        if key not in self._known:
+            self._known[key] = policy, self.roll_out(policy, seed)
+        return self._known[key][1]
+
+
+def rows_of(skill: str, sessions: Sequence[Results]) -> list[Row]:
+    """The measures of every rule after every round, over the sessions of a skill."""
+    rows = []
+    for rule in (*DOUBTING, *RIVALS):
+        for number in range(len(sessions[0][rule])):
+            named: Row = {"skill": skill, "rule": rule, "round": number}
+            measured = [results[rule][number] for results in sessions]
+            rows.append(mean_row(named, "success_percent", [100.0 * one.success for one in measured]))
+            rows.append(row(named, "questions", float(np.mean([one.questions for one in measured]))))
+            gains = [100.0 * _gain(results, rule, number) for results in sessions]
+            rows.append(mean_row(named, "gain_percent", gains))
+            rows += _of_mentor(named, measured)
+        reached = [_questions_to(results[rule]) for results in sessions]
+        rows.append(mean_row({"skill": skill, "rule": rule, "round": None}, "questions_to_90", reached))
+    return rows
+
+
+def _gain(results: Results, rule: str, number: int) -> float:
+    """The success of a rule above that of asking at random with as many questions, in one session."""
+    by_chance, mine = results["random"], results[rule][number]
+    asked, reached = [one.questions for one in by_chance], [one.success for one in by_chance]
+    return mine.success - float(np.interp(mine.questions, asked, reached))
+
+
+def _of_mentor(named: Row, measured: Iterable[Measured]) -> list[Row]:
+    """What the mentors would have asked in all episodes of a round, and how long before failures."""
+    measured = [*measured]
+    failures = sum(one.successes.count(False) for one in measured)
+    promised = [one for one in measured if one.promise is not None]
+    successes = sum(one.successes.count(True) for one in promised)
+    leads = [0.1 * steps for one in measured for steps in one.lead_steps]
+    rows = []
+    if failures:
+        rows.append(row(named, "warned_percent", 100.0 * sum(one.warned for one in measured) / failures))
+    if successes:
+        rows.append(row(named, "false_alarms_percent", 100.0 * sum(one.false_alarms for one in promised) / successes))
+    if leads:
+        rows.append(row(named, "lead_s", float(np.median(leads))))
+    return rows
+
+
+def _questions_to(measured: Sequence[Measured]) -> int:
+    """The questions until a round reached GOAL; one more than all if none did."""
+    return next((one.questions for one in measured if one.success >= GOAL), measured[-1].questions + 1)
+
+
+def _picture(rows: Sequence[Row]) -> bytes:
+    """A picture of success against questions, a line for each rule."""
+    colours = (BLUE, ORANGE, GREEN, PURPLE, RED, SKY)
+    looks = dict(zip(DOUBTING, colours, strict=True)) | {"random": INK, "clock": GREY}
+
+    def draw(figure: "Figure") -> None:
+        axes = figure.add_subplot()
+        for rule, colour in looks.items():
+            at = [
+                (asked["value"], success["value"])
+                for asked, success in zip(
+                    those(rows, rule=rule, measure="questions"),
+                    those(rows, rule=rule, measure="success_percent"),
+                    strict=True,
+                )
+            ]
+            line = "o--" if rule in RIVALS else "o-"
+            axes.plot(*zip(*at, strict=True), line, color=colour, label=rule, markersize=4, linewidth=1.3)
+        axes.set(xlabel="questions", ylabel="successful episodes [%]", xlim=(0, None), ylim=(0, 102))
+        axes.grid()
+        legend_below(figure)
+
+    return picture_bytes(draw, 7.0, 4.2)
