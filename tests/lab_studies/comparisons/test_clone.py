@@ -24,7 +24,7 @@ def measured(number: int, succeeded: int, questions: int, warned: int = 0, false
 
 def session(random_end: int, distance_end: int) -> Results:
     still = [measured(0, 4, 0), measured(1, 4, 0)]
-    results = {rule: still for rule in (*DOUBTING, *RIVALS)}
+    results = dict.fromkeys((*DOUBTING, *RIVALS), still)
     results["random"] = [measured(0, 4, 0), measured(1, random_end, 10)]
     results["distance"] = [measured(0, 4, 0, warned=3), measured(1, distance_end, 5, warned=1, false_alarms=2)]
     return results
