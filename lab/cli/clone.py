@@ -52,6 +52,9 @@ def clone(
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for datasets (LeRobot), students, mentors and measurements.")
     ] = None,
+    plot: Annotated[
+        Path | None, typer.Option("--plot", help="Picture (.png or .svg) of the success by questions.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Clone a skill from demonstrations: roll the student out in physics, let it ask, learn the corrections, and again.
@@ -61,6 +64,8 @@ def clone(
     """
     if (skill is None) == (resume is None):
         raise BadInput("wanted a skill, or --resume DIR; one of the two")
+    if plot is not None:
+        deferred.check_picture(plot)
     if resume is not None:
         if out is not None:
             raise BadInput(f"--out beside --resume: the session stays in '{resume}'")
@@ -89,12 +94,17 @@ def clone(
             console().print(_line(measured[-1]), markup=False)
     finally:
         kept.problem.close()
+    if plot is not None:
+        title = f"{kept.problem.skill}, asking by {kept.options.rule}"
+        asked = [one.questions for one in measured]
+        deferred.success_by_questions([one.successes for one in measured], asked, title, plot)
     document = {
         "task": kept.problem.task,
         "skill": kept.problem.skill,
         "rule": kept.options.rule,
         "rounds": [asdict(one) | {"success": one.success} for one in measured],
         "out": None if folder is None else str(folder),
+        "plot": None if plot is None else str(plot),
     }
     show(document, as_json, _summary)
 

@@ -134,6 +134,7 @@ if TYPE_CHECKING:
     from lab.toolbox.versions import EVALUATED, Version
     from lab.view.canvas import check_picture
     from lab.view.cell_plan import draw_cell
+    from lab.view.clone_plot import success_by_questions
     from lab.view.cyclic_summary import cyclic_summary
     from lab.view.mentor_report import COLUMNS, report_document, report_page, table_lines
     from lab.view.meshcat import LiveView, replay_html
@@ -292,6 +293,7 @@ TABLE = {
     "lab.toolbox.registry": ("Toolbox",),
     "lab.view.canvas": ("check_picture",),
     "lab.view.cell_plan": ("draw_cell",),
+    "lab.view.clone_plot": ("success_by_questions",),
     "lab.view.cyclic_summary": ("cyclic_summary",),
     "lab.view.progress": ("counting", "EscapingConsole"),
     "lab.view.mentor_report": ("COLUMNS", "report_document", "report_page", "table_lines"),

@@ -13,7 +13,9 @@ def test_it_clones_asks_and_goes_on(lab: Callable[..., Any], tmp_path: Path) -> 
     out = tmp_path / "grasp"
     first = lab("clone", "grasp", *SHORT, "--rounds", "0", "--out", str(out), "--json").json
     assert [one["questions"] for one in first["rounds"]] == [0]
-    after = lab("clone", "--resume", str(out), "--rounds", "1")
+    plot = tmp_path / "rounds.svg"
+    after = lab("clone", "--resume", str(out), "--rounds", "1", "--plot", str(plot))
+    assert ">round 1</text>" in plot.read_text(encoding="utf-8")
     assert "1 question" in after.err
     assert "LeRobot" in after.out
 
@@ -27,6 +29,7 @@ def test_it_clones_asks_and_goes_on(lab: Callable[..., Any], tmp_path: Path) -> 
         (["grap"], "grap"),
         (["grasp", "--task", "toas"], "toas"),
         (["--resume", "nothing"], "nothing"),
+        (["grasp", "--plot", "x.gif"], "x.gif"),
         (["grasp", "--resume", "nothing"], "one of the two"),
     ],
 )
