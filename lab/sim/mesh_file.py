@@ -24,6 +24,27 @@ def vertices(path: Path) -> Array:
     return np.array([parts[1:4] for parts in lines if parts[:1] == [word]], dtype=float)
 
 
+def triangles(path: Path) -> Array:
+    """The triangles (n, 3, 3) of an OBJ or STL file, in its own unit. ValueError when they cannot be read as numbers.
+
+    A face of an OBJ file with more corners is taken as a fan.
+    """
+    corners = vertices(path)
+    if path.suffix.lower() == ".stl":
+        return corners.reshape(-1, 3, 3)
+    fans = []
+    for line in _text(read_limited(path, MAX_BYTES)).splitlines():
+        words = line.split()
+        if words[:1] == ["f"]:
+            at = [int(word.partition("/")[0]) for word in words[1:]]
+            at = [number - 1 if number > 0 else len(corners) + number for number in at]
+            fans += [(at[0], one, other) for one, other in zip(at[1:], at[2:], strict=False)]
+    chosen = np.array(fans, int).reshape(-1, 3)
+    if chosen.size and not (0 <= chosen.min() and chosen.max() < len(corners)):
+        raise ValueError("a face names a corner that is not there")
+    return np.asarray(corners[chosen])
+
+
 def text_corners(path: Path | None) -> Array | None:
     """The corners (3 n, 3) of the triangles of an STL file in text, one after the other; None if it is no such file."""
     if path is None or path.suffix.lower() != ".stl" or is_binary(read_limited(path, MAX_BYTES)):
