@@ -1,5 +1,6 @@
 """Mesh files, OBJ or STL: their vertices, read without a heavy library, and their bytes for a library that reads UTF-8 only."""
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -38,9 +39,9 @@ def triangles(path: Path) -> Array:
         if words[:1] == ["f"]:
             at = [int(word.partition("/")[0]) for word in words[1:]]
             at = [number - 1 if number > 0 else len(corners) + number for number in at]
-            fans += [(at[0], one, other) for one, other in zip(at[1:], at[2:], strict=False)]
+            fans += [(at[0], one, other) for one, other in pairwise(at[1:])]
     chosen = np.array(fans, int).reshape(-1, 3)
-    if chosen.size and not (0 <= chosen.min() and chosen.max() < len(corners)):
+    if chosen.size and (chosen.min() < 0 or chosen.max() >= len(corners)):
         raise ValueError("a face names a corner that is not there")
     return np.asarray(corners[chosen])
 

@@ -45,8 +45,9 @@ class Arm:
     """One arm with its gripper, its foot `base_up_m` [m] above the origin.
 
     urdf: the checked URDF that physics loads; joints (k,) from the foot to the tool, their ranges lower, upper (k,) [rad] and
-    speed (k,) [rad/s]; torque_nm: the most that a joint's motor gives; None: what it takes. tool_link, tip (4, 4): the finger tips' frame in it, x out of the gripper, y across; nearest_m: the least
+    speed (k,) [rad/s]; tool_link, tip (4, 4): the finger tips' frame in it, x out of the gripper, y across; nearest_m: the least
     distance of the tool from the first axis, so that it clears the arm. level: the level tool's kinematics; None: it hangs.
+    torque_nm: the largest torque of a joint's motor [Nm]; None: it has no limit.
     """
 
     name: str
@@ -154,7 +155,7 @@ class Arm:
         joints = self._bent(poses)
         if not self.kinematics.aside.any():
             return joints, joints
-        turned = self._bent(poses + [0.0, 0.0, 0.0, pi])
+        turned = self._bent(poses + np.array([0.0, 0.0, 0.0, pi]))
         turned[:, -1] -= pi
         return joints, turned
 

@@ -15,7 +15,8 @@ from lab.sim.urdf_reader import floats, placed
 
 SLICE_M = 0.006  # thickness of a slice
 ROUND_M = 2e-4  # to which the corners of a piece are rounded
-HEAVY_BYTES = 200_000  # of a collision mesh: beyond it, its hull alone is loaded
+HEAVY_BYTES = 200_000  # of a mesh: beyond it, its hull alone collides, and a thinned one is seen
+SEEN_M = 1.5e-3  # to which the corners of a thinned mesh are joined
 
 Array = NDArray[np.float64]
 Pieces = list[tuple[Array, NDArray[np.int_]]]  # corners (n, 3) [m] and triangles (m, 3) of each
@@ -36,7 +37,11 @@ def pieces_of(urdf: Urdf, links: list[str], along: Array) -> dict[str, Pieces]:
             if mesh is None:
                 alone = Xml.Element("link")
                 alone.append(collision)
-                cut += _hulls([solid_vertices(alone)])
+                cut += [
+                    piece
+                    for corners, faces in _hulls([solid_vertices(alone)])
+                    for piece in _hulls(slices_of(corners[faces], axes.T @ along))
+                ]
                 continue
             slices = _hulls(slices_of(_triangles(collision, mesh), axes.T @ along))
             link.remove(collision)
@@ -70,8 +75,14 @@ def _crossings(first: Array, then: Array, begin: Array, end: Array, plane: float
 
 
 def lighten(urdf: Urdf) -> None:
-    """Replaces heavy collision meshes by their convex hulls, as which physics takes them anyway."""
+    """Replaces heavy collision meshes by their convex hulls, as which physics takes them anyway, and thins heavy visuals out."""
     for link in urdf.links.values():
+        for visual in link.findall("visual"):
+            mesh = visual.find("geometry/mesh")
+            if mesh is not None and Path(mesh.get("filename", "")).stat().st_size > HEAVY_BYTES:
+                mesh.set("filename", str(mesh_written(*thinned(_triangles(visual, mesh), SEEN_M))))
+                mesh.attrib.pop("scale", None)
+                visual[:] = [piece for piece in visual if piece.tag != "origin"]
         for collision in link.findall("collision"):
             mesh = collision.find("geometry/mesh")
             if mesh is None or Path(mesh.get("filename", "")).stat().st_size <= HEAVY_BYTES:
@@ -81,9 +92,30 @@ def lighten(urdf: Urdf) -> None:
                 _add_mesh(link, mesh_written(corners, faces))
 
 
-def _triangles(collision: Xml.Element, mesh: Xml.Element) -> Array:
-    """The triangles (n, 3, 3) [m] of a collision mesh, in its link's frame."""
-    frame, scale = placed(collision.find("origin")), np.array(floats(mesh, "scale", "1 1 1"))
+def thinned(triangles: Array, cell_m: float) -> tuple[Array, NDArray[np.int_]]:
+    """The corners (n, 3) and triangles (m, 3) of a mesh whose corners (k, 3, 3) [m] are joined within cubes of edge `cell_m`.
+
+    A corner is the mean of those that it replaces. Source: vertex clustering, J. Rossignac and P. Borrel, 1993.
+    """
+    points = triangles.reshape(-1, 3)
+    number, cube = np.unique(_cubes(points, cell_m), return_inverse=True)
+    count = np.bincount(cube, minlength=len(number))
+    corners = np.stack([np.bincount(cube, points[:, k], len(number)) / count for k in range(3)], axis=1)
+    faces = cube.reshape(-1, 3)
+    kept = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+    return corners, np.unique(faces[kept], axis=0)
+
+
+def _cubes(points: Array, cell_m: float) -> NDArray[np.int_]:
+    """The number (n,) of the cube of edge `cell_m` around whose middle each of points (n, 3) is; neighbours need not follow."""
+    at = np.round(points / cell_m).astype(int)
+    span = np.ptp(at, axis=0) + 1
+    return np.asarray((at - at.min(axis=0)) @ np.array([1, span[0], span[0] * span[1]]))
+
+
+def _triangles(piece: Xml.Element, mesh: Xml.Element) -> Array:
+    """The triangles (n, 3, 3) [m] of the mesh of a visual or collision, in its link's frame."""
+    frame, scale = placed(piece.find("origin")), np.array(floats(mesh, "scale", "1 1 1"))
     corners = mesh_file.triangles(Path(mesh.get("filename", ""))) * scale
     return np.asarray(corners @ frame[:3, :3].T + frame[:3, 3])
 
@@ -92,10 +124,8 @@ def _hulls(pieces: list[Array], rounded_m: float = ROUND_M) -> Pieces:
     """The convex hulls of points (n, 3) each; those without a volume are left out."""
     hulls: Pieces = []
     for points in pieces:
-        at = np.round(points / rounded_m).astype(int)
-        span = np.ptp(at, axis=0, keepdims=True) + 1
-        number = ((at - at.min(axis=0)) * [1, span[0, 0], span[0, 0] * span[0, 1]]).sum(axis=1)
-        corners = at[np.unique(number, return_index=True)[1]] * rounded_m
+        first = np.unique(_cubes(points, rounded_m), return_index=True)[1]
+        corners = np.round(points[first] / rounded_m) * rounded_m
         if len(corners) < 4 or np.linalg.matrix_rank(corners - corners[0], tol=rounded_m) < 3:
             continue
         hull = scipy.spatial.ConvexHull(corners)

@@ -20,9 +20,10 @@ PAD_M = 0.011  # effective radius at which the friction of a finger's pad, of 3 
 class Gripper:
     """Two fingers, which close along the tool's y axis [m].
 
-    one_jaw: only one of them moves, and pushes the part against the other. opening_m: the distance between the open pads. depth_m: from the finger tips up to the palm. width_m, thick_m: a
+    opening_m: the distance between the open pads. depth_m: from the finger tips up to the palm. width_m, thick_m: a
     finger's size across the closing direction and along it. level: the tool is held level, not hanging. hand_m: how far the
-    hand above the palm reaches from the tool's axis, across the closing direction and along it.
+    hand above the palm reaches from the tool's axis, across the closing direction and along it. one_jaw: only one of the
+    fingers moves, and pushes the part against the other; with a jaw that swings, they are parallel at one opening alone.
     """
 
     opening_m: float

@@ -254,17 +254,23 @@ def mesh_written(corners: Array, faces: NDArray[np.int_]) -> Path:
     """The path of an OBJ file of corners (n, 3) [m] and triangles (m, 3), in the folder of `written`."""
     points = "".join(f"v {x:.6f} {y:.6f} {z:.6f}\n" for x, y, z in corners.tolist())
     text = points + "".join(f"f {i + 1} {j + 1} {k + 1}\n" for i, j, k in faces.tolist())
-    path = Path(_folder().name) / f"{hashlib.sha256(text.encode()).hexdigest()[:20]}.obj"
-    if not path.exists():
-        write_whole(path, text.encode())
-    return path
+    return _kept(text.encode(), "mesh", ".obj")
 
 
 def written(root: Xml.Element, name: str) -> Path:
-    """The path of the file that a settled URDF is written to, in a folder that is removed when this process ends."""
+    """The path of the file that a settled URDF is written to, in a folder that is removed when this process ends.
+
+    Different arms have different files, also when their own files have one name.
+    """
     Xml.indent(root)
-    path = Path(_folder().name) / f"{name}.urdf"
-    write_whole(path, Xml.tostring(root, encoding="unicode").encode())
+    return _kept(Xml.tostring(root, encoding="unicode").encode(), name, ".urdf")
+
+
+def _kept(content: bytes, name: str, suffix: str) -> Path:
+    """The path of a file with this content."""
+    path = Path(_folder().name) / f"{name}-{hashlib.sha256(content).hexdigest()[:20]}{suffix}"
+    if not path.exists():
+        write_whole(path, content)
     return path
 
 

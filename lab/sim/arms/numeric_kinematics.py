@@ -1,9 +1,9 @@
 """Joints for a vertical tool by Newton's method, for any arm whose first joint turns it and whose last turns its tool.
 
-The tool may stand beside the last joint's axis, as the middle of one jaw and a fixed one does; all solutions here hold the axis,
-and `aside` says where the tool is. The joints between these two depend on two numbers, how far out and how high the tool is. A table over both is made once, each
+The joints between these two depend on two numbers, how far out and how high the tool is. A table over both is made once, each
 entry from its neighbours, so that all of it belongs to one branch of solutions; a pose starts from its table entry. So the joints
-are a function of the pose alone, and neighbouring poses have neighbouring joints.
+are a function of the pose alone, and neighbouring poses have neighbouring joints. A tool may be beside the last joint's axis, as
+the middle between one jaw and a fixed one is: the table is then that of the axis, and `aside` says where the tool is.
 Source: damped least squares, Y. Nakamura and H. Hanafusa, 1986; a redundant arm stays near one posture, A. Liegeois, 1977.
 """
 

@@ -49,23 +49,21 @@ def jaw_of(urdf: Urdf, joint: str, tool: str, tip: Array, opening_m: float | Non
     """The fingers of a hand whose only moving jaw hangs on `joint`, and the frame (4, 4) of the open jaws' middle in `tool`.
 
     `tip` (4, 4): the finger tips' frame in `tool`, x out of the gripper; its other axes may point anywhere across. opening_m:
-    between the open jaws; None: as wide as they open. The collision meshes of both are cut into convex pieces, which hold the space
-    between the jaws free. BadInput if the joint does not move a jaw across the tool towards the hand.
+    between the open jaws; None: as wide as they open. The collision meshes of both are cut into convex pieces, which leave the
+    space between the jaws free. BadInput if the joint does not move a jaw across the tool towards the hand.
     """
     moved = urdf.below(child(urdf.joint(joint, "robot.fingers")))
     body = _fixed_to(urdf, _hand_of(urdf, tool))
     where = f"{urdf.path}: the finger joint {joint}"
     if parent(urdf.joints[joint]) not in body:
-        raise BadInput(
-            f"{where} does not open and close two fingers: it moves no jaw of the hand that '{tool}' is fixed to"
-        )
+        raise BadInput(f"{where} opens and closes no jaw: it does not hang on the hand of '{tool}'")
     out = Chain.of(urdf, tool, tip).ends(np.zeros((1, len(Chain.of(urdf, tool).names))))[1][0][:, 0]
     hand = _Hand(urdf, joint, tool, tip, pieces_of(urdf, body, out), pieces_of(urdf, moved, out))
     tip = tip @ _turned(_heading(hand, where))
     hand = _Hand(urdf, joint, tool, tip, hand.hand, hand.jaw)
     positions, gaps = _opening(hand)
     if len(gaps) < 2:
-        raise BadInput(f"{where} does not open and close two fingers along one direction across '{tool}'")
+        raise BadInput(f"{where} opens and closes no jaw: it does not move across '{tool}', towards the hand")
     widest = float(gaps[-1])
     if opening_m is not None and not 0 < opening_m <= widest + 1e-9:
         raise BadInput(f"robot.opening_m {opening_m}: the gripper opens {widest:.3f} m at the most")
@@ -113,7 +111,7 @@ def _heading(hand: _Hand, where: str) -> int:
         if not tips:
             which = "no jaw" if pieces is hand.jaw else "no part of the hand"
             raise BadInput(
-                f"{where} does not open and close two fingers: {which} comes within {PAD_M} m of robot.tip_m"
+                f"{where} opens and closes no jaw: {which} comes within {PAD_M} m of the finger tips (robot.tip_m)"
             )
         middles.append(np.concatenate(tips).mean(axis=0))
     across, up = (middles[0] - middles[1])[1:]
@@ -164,10 +162,11 @@ def _gripper(hand: _Hand, opening: float, opened: float) -> Gripper:
     solid = hand.points(hand.hand, 0.0) + hand.points(hand.jaw, opened)
     pads = np.concatenate(_near_tips(solid))
     width = 2 * float(np.abs(pads[:, 2]).max())
-    clear = opening / 2 - ASIDE_M
-    between = [points for points in solid if points[:, 1].min() < clear and points[:, 1].max() > -clear]
-    between = [points for points in between if np.abs(points[:, 2]).min() < width / 2]
-    depth = -max((float(points[:, 0].max()) for points in between), default=-np.inf)
+    clear = np.array([opening / 2 - ASIDE_M, width / 2])
+    lows, highs = ([points[:, 1:].min(axis=0) for points in solid], [points[:, 1:].max(axis=0) for points in solid])
+    between = np.all((np.array(lows) < clear) & (np.array(highs) > -clear), axis=1)
+    tops = [float(points[:, 0].max()) for points, inside in zip(solid, between, strict=True) if inside]
+    depth = -max(tops, default=min(float(points[:, 0].min()) for points in hand.points(hand.jaw, opened)))
     all_points = np.concatenate(solid)
     behind = np.abs(all_points[all_points[:, 0] <= -depth + 1e-9]).max(axis=0, initial=0.0)
     thick = float(max(np.abs(pads[:, 1]).max() - opening / 2, 0.0))
