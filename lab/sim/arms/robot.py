@@ -75,6 +75,8 @@ def _check_reached(joints: Array, poses: Array) -> None:
 
 def _turned_back(arm: Arm, turn: float, first: Array, speed: float, acceleration: float) -> Array:
     """Rows (n, k) that turn the tool on the spot by half turns, from `turn` [rad] to `first` (k,), where its range ends."""
+    if arm.kinematics.aside.any():  # the first joint turns, too
+        turn = first[-1] + pi * round((turn - first[-1]) / pi)
     turns = timed([ToolPose(0.0, 0.0, 0.0, turn), ToolPose(0.0, 0.0, 0.0, first[-1])], speed, acceleration)[:, 3]
     return arm.spun(first, turns - first[-1])
 

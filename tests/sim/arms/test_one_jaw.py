@@ -43,14 +43,15 @@ def turning(name: str, parent: str, child: str, xyz: str, axis: str, rpy: str = 
 def urdf(jaw: str) -> str:
     """Five joints, the first 4 cm before the foot; a palm, a fixed jaw behind x = 0 of the hand, and the jaw's box before it.
 
-    The tips are 0.08 m out. A sliding jaw's inner side is at x = 12 mm when its joint is at 0; a swinging one is a lever of 0.07 m.
+    The tips are 0.08 m out. A sliding jaw's inner side is at x = 12 mm when its joint is at 0; a swinging one's at 22 mm.
     """
     at = "0.005 0 0.035" if jaw is SLIDES else "0.005 0 0.065"
     hand = box("0.04 0.04 0.02", "0.01 0 -0.01") + box("0.01 0.02 0.08", "-0.005 0 0.04")
     return (
         f'<robot name="small"><link name="foot"/><link name="l1">{MASS}</link><link name="l2">{MASS}</link>'
         f'<link name="l3">{MASS}</link><link name="l4">{MASS}</link><link name="hand">{MASS}{hand}</link>'
-        '<link name="tips"><inertial><mass value="1e-9"/><inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/></inertial></link>'
+        '<link name="tips"><inertial><mass value="1e-9"/>'
+        '<inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/></inertial></link>'
         f'<link name="finger">{MASS}{box("0.01 0.02 0.03", at)}</link>'
         '<joint name="to tips" type="fixed"><parent link="hand"/><child link="tips"/></joint>'
         + turning("j1", "foot", "l1", "0.04 0 0.1", "0 0 1")
@@ -131,6 +132,15 @@ def test_half_a_turn_on_the_spot_leaves_the_tool_in_its_place() -> None:
     at, _ = arm().kinematics.chain.ends(rows)  # type: ignore[attr-defined]
     assert at == pytest.approx(np.repeat(at[:1], 50, axis=0), abs=1e-6)
     assert np.abs(np.diff(rows, axis=0)).max() < 0.2
+    way = plan(arm(), [here, ToolPose(0.2, 0.0, 0.06, 0.0)], 0.2, 1.0, 0.0, rows[-1])
+    nearest = [np.abs(way.positions - row).max(axis=1).min() for row in (rows[-1], joints)]
+    assert nearest[0] < 0.02  # it goes on, turned by half a turn
+    first = ToolPose(0.2, 0.0, 0.05, 2.4)
+    turned = arm().inverse(first)
+    assert turned is not None
+    over = plan(arm(), [first, ToolPose(0.2, 0.0, 0.05, 3.7)], 0.3, 1.0, 0.0, turned).positions
+    assert np.abs(over[0] - turned).max() < 0.01
+    assert np.abs(np.diff(over, axis=0)).max() < 0.05
 
 
 @settings(max_examples=20)
