@@ -97,11 +97,10 @@ class Arm:
         both = self._both_ways(poses)
         best = np.full_like(both[0], np.nan)
         for half in sorted(_WAYS_ROUND, key=lambda half: (half % 2, abs(half))):
-            joints = both[half % 2].copy()
-            joints[:, -1] += half * pi
-            inside = (joints[:, -1] >= self.lower[-1]) & (joints[:, -1] <= self.upper[-1])
-            chosen = np.isnan(best[:, -1]) & inside
-            best[chosen] = joints[chosen]
+            turned = both[half % 2][:, -1] + half * pi
+            chosen = np.isnan(best[:, -1]) & (turned >= self.lower[-1]) & (turned <= self.upper[-1])
+            best[chosen] = both[half % 2][chosen]
+            best[chosen, -1] = turned[chosen]
         return best
 
     def inverse_path(self, poses: Array, before: Array | None = None) -> Array:

@@ -3,8 +3,6 @@
 The jaw closes along any direction across the tool. Its pads need not be parallel: what counts is the clear distance between them.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,26 +20,27 @@ ASIDE_M = 0.002  # [m] by which something may reach into the clear space between
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
 class _Hand:
-    """The convex pieces of a hand and of its jaw. tip (4, 4): the finger tips' frame in the link `tool`."""
+    """The convex pieces of a hand and of its jaw, seen from the finger tips' frame `tip` (4, 4) in the link `tool`."""
 
-    urdf: Urdf
-    joint: str
-    tool: str
-    tip: Array
-    hand: dict[str, Pieces]
-    jaw: dict[str, Pieces]
+    def __init__(
+        self, urdf: Urdf, joint: str, tool: str, tip: Array, pieces: tuple[dict[str, Pieces], dict[str, Pieces]]
+    ) -> None:
+        self.urdf, self.joint, self.tool = urdf, joint, tool
+        self.hand, self.jaw = pieces
+        self._chains = {link: Chain.of(urdf, link) for link in (*self.hand, *self.jaw)}
+        self._end = Chain.of(urdf, tool)
+        self.tip = tip
 
     def points(self, pieces: dict[str, Pieces], position: float) -> list[Array]:
         """The corners (n, 3) [m] of each piece in the finger tips' frame, with the jaw's joint at `position`."""
-        end = Chain.of(self.urdf, self.tool, self.tip)
-        foot, axes = end.ends(np.zeros((1, len(end.names))))
+        at, turn = self._end.ends(np.zeros((1, len(self._end.names))))
+        foot, axes = at[0] + turn[0] @ self.tip[:3, 3], turn[0] @ self.tip[:3, :3]
         placed = []
         for link, convex in pieces.items():
-            chain = Chain.of(self.urdf, link)
+            chain = self._chains[link]
             here, turned = chain.ends(np.array([[position if name == self.joint else 0.0 for name in chain.names]]))
-            placed += [(points @ turned[0].T + here[0] - foot[0]) @ axes[0] for points, _ in convex]
+            placed += [(points @ turned[0].T + here[0] - foot) @ axes for points, _ in convex]
         return placed
 
 
@@ -58,9 +57,8 @@ def jaw_of(urdf: Urdf, joint: str, tool: str, tip: Array, opening_m: float | Non
     if parent(urdf.joints[joint]) not in body:
         raise BadInput(f"{where} opens and closes no jaw: it does not hang on the hand of '{tool}'")
     out = Chain.of(urdf, tool, tip).ends(np.zeros((1, len(Chain.of(urdf, tool).names))))[1][0][:, 0]
-    hand = _Hand(urdf, joint, tool, tip, pieces_of(urdf, body, out), pieces_of(urdf, moved, out))
-    tip = tip @ _turned(_heading(hand, where))
-    hand = _Hand(urdf, joint, tool, tip, hand.hand, hand.jaw)
+    hand = _Hand(urdf, joint, tool, tip, (pieces_of(urdf, body, out), pieces_of(urdf, moved, out)))
+    hand.tip = tip @ _turned(_heading(hand, where))
     positions, gaps = _opening(hand)
     if len(gaps) < 2:
         raise BadInput(f"{where} opens and closes no jaw: it does not move across '{tool}', towards the hand")
@@ -72,8 +70,10 @@ def jaw_of(urdf: Urdf, joint: str, tool: str, tip: Array, opening_m: float | Non
     middle[1, 3] = _inner(hand.points(hand.hand, 0.0)) + opening / 2
     opened = float(np.interp(opening, gaps, positions))
     links = (tuple(hand.jaw), tuple(hand.hand))
-    gripper = _gripper(_Hand(urdf, joint, tool, tip @ middle, hand.hand, hand.jaw), opening, opened)
-    return Fingers((joint,), (joint,), {}, links, gaps / 2, positions[:, None], gripper), tip @ middle
+    hand.tip = hand.tip @ middle
+    return Fingers(
+        (joint,), (joint,), {}, links, gaps / 2, positions[:, None], _gripper(hand, opening, opened)
+    ), hand.tip
 
 
 def _hand_of(urdf: Urdf, link: str) -> str:
