@@ -17,7 +17,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 def column(x: float, y: float, wide: float, high: float, foot: float = 0.0) -> np.ndarray:
-    return CUBE * [wide, wide, high - foot] + [x, y, foot]
+    return np.asarray(CUBE * [wide, wide, high - foot] + [x, y, foot])
 
 
 def volume(points: np.ndarray) -> float:
