@@ -15,6 +15,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
+PAGE_EXAMPLES = ROOT / "devtools" / "page_examples.py"
 SMALL = "S..\n.#.\n..G"  # a grid world that is learned in a second
 ALL_OK, WRONG_INPUT = 0, 2
 CLUSTER = """
@@ -153,13 +154,17 @@ def families(place: Place) -> None:
 
 def lessons(place: Place) -> None:
     """The pages whose commands are run, the five lessons among them: their commands and their Python, each in its own folder."""
-    script = ROOT / "devtools" / "page_examples.py"
-    for folder in run_path(str(script))["COMMANDS_RUN"]:
+    for folder in run_path(str(PAGE_EXAMPLES))["COMMANDS_RUN"]:
         for page in sorted((ROOT / "docs" / folder).glob("*.md")):
-            own = place.work / f"page-{page.stem}"
-            own.mkdir()
-            begin = f"import os\nos.chdir({str(own)!r})\n{script.read_text(encoding='utf-8')}"
-            place.called(["-c", begin, str(page)], f"the page {folder}/{page.stem}")
+            page_run(place, page)
+
+
+def page_run(place: Place, page: Path) -> None:
+    """The examples of a page, in a folder of its own."""
+    own = place.work / f"page-{page.stem}"
+    own.mkdir()
+    begin = f"import os\nos.chdir({str(own)!r})\n{PAGE_EXAMPLES.read_text(encoding='utf-8')}"
+    place.called(["-c", begin, str(page)], f"the page {page.parent.name}/{page.stem}")
 
 
 def refused(place: Place) -> None:
@@ -216,6 +221,11 @@ def with_people(place: Place) -> None:
     arms_compared(place)
 
 
+def with_recordings(place: Place) -> None:
+    """A dataset with pictures is written and read, as the page about it does."""
+    page_run(place, ROOT / "docs" / "recordings.md")
+
+
 def arms_compared(place: Place, *options: str, **wanted: Any) -> None:
     """The arms of a study with four participants, in tables that are written here, are compared."""
     tables = place.work / "arms"
@@ -233,6 +243,7 @@ EXTRAS = {
     "dask": with_dask,
     "data": with_data,
     "people": with_people,
+    "recordings": with_recordings,
     "remote": with_remote,
     "tune": with_tune,
 }  # each but docs, test and dev

@@ -163,21 +163,21 @@ def _run(path: Path) -> object:
 
 
 def _program(path: Path) -> object:
-    from lab.export import FORMATS
+    from lab.export import program_formats
     from lab.export.program import Options, Program
 
     program = Program.load(path.parent)
     if len(program.carried.actions) > MOST_ACTIONS:
         return program
     options = Options("rectan", "2026/01/01 00:00")
-    return [FORMATS[name].write(program, options) for name in ("jbi", "csv", "json")]
+    return [program_formats()[name].write(program, options) for name in ("jbi", "csv", "json")]
 
 
 def _read_back(path: Path) -> object:
-    from lab.export import FORMATS
+    from lab.export import program_formats
 
     texts = {file.name: file.read_bytes().decode("utf-8", "replace") for file in path.parent.iterdir()}
-    return FORMATS[path.parent.name].read(texts, _up6())
+    return program_formats()[path.parent.name].read(texts, _up6())
 
 
 @cache

@@ -175,11 +175,11 @@ def meshes(folder: Path, room: Path) -> None:
 
 def exported(folder: Path, room: Path) -> None:
     """Write the room's run in every format of `lab export` that its arm has, and copy the run."""
-    from lab.export import FORMATS
+    from lab.export import program_formats
     from lab.export.program import Options, Program
 
     program = Program.load(room / "run")
-    for name, form in FORMATS.items():
+    for name, form in program_formats().items():
         try:
             files = form.write(program, Options("rectan", "2026/01/01 00:00"))
         except Exception:  # this arm does not have the format

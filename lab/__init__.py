@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from lab.learning.requests import AdviceRequest, AdvisorLeft
     from lab.learning.updates import RuleUpdate, Update
     from lab.mdp import Rewards, TabularMDP, grid
+    from lab.mentor.mentor import Mentor
+    from lab.recordings.episode import Episode, Recording
     from lab.sequencing.cell.cell import Cell
     from lab.tasks.grid_world import GridWorld
     from lab.teaching.mentor import watch
@@ -46,6 +48,8 @@ _FACE = {
     "lab.learning.requests": ("AdviceRequest", "AdvisorLeft"),
     "lab.learning.updates": ("RuleUpdate", "Update"),
     "lab.mdp": ("Rewards", "TabularMDP", "grid"),
+    "lab.mentor.mentor": ("Mentor",),
+    "lab.recordings.episode": ("Episode", "Recording"),
     "lab.sequencing.cell.cell": ("Cell",),
     "lab.tasks.grid_world": ("GridWorld",),
     "lab.toolbox.policy": ("Policy",),
@@ -58,16 +62,19 @@ __all__ = [
     "AdvisorLeft",
     "BadInput",
     "Cell",
+    "Episode",
     "FoundSubtasks",
     "Gate",
     "GridWorld",
     "LabError",
     "LessonResult",
+    "Mentor",
     "OrderResult",
     "Page",
     "Picture",
     "Policy",
     "Problem",
+    "Recording",
     "Rewards",
     "RuleGate",
     "RuleUpdate",

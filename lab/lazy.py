@@ -6,6 +6,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    import av
     import cv2
     import distributed
     import fsspec.core
@@ -47,10 +48,12 @@ if TYPE_CHECKING:
     import rich.table
     import rich.text
     import scipy
+    import sklearn.neural_network
     import statsmodels.regression.mixed_linear_model
     import tensorboard.compat.proto.event_pb2
     import tensorboard.compat.proto.summary_pb2
     import tensorboard.summary.writer.event_file_writer
+    import threadpoolctl
     import torch
     import trimesh.voxel.ops
     import yaml
@@ -58,6 +61,7 @@ if TYPE_CHECKING:
 # library -> the modules that are loaded with it: `from lab.lazy import trimesh` stands for `import trimesh`, and loads it when
 # one of its names is first used
 LIBRARIES: Mapping[str, Sequence[str]] = {
+    "av": ("av",),
     "cv2": ("cv2",),
     "distributed": ("distributed",),
     "fsspec": ("fsspec.core",),
@@ -97,12 +101,14 @@ LIBRARIES: Mapping[str, Sequence[str]] = {
     "pydantic": ("pydantic",),
     "rich": ("rich.console", "rich.padding", "rich.panel", "rich.table", "rich.text"),
     "scipy": ("scipy",),
+    "sklearn": ("sklearn.neural_network",),
     "statsmodels": ("statsmodels.regression.mixed_linear_model",),
     "tensorboard": (
         "tensorboard.compat.proto.event_pb2",
         "tensorboard.compat.proto.summary_pb2",
         "tensorboard.summary.writer.event_file_writer",
     ),
+    "threadpoolctl": ("threadpoolctl",),
     "torch": ("torch",),
     "trimesh": ("trimesh.voxel.ops",),
     "yaml": ("yaml",),

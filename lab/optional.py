@@ -12,17 +12,18 @@ EXTRAS = {  # extra in pyproject.toml -> the optional libraries that it installs
     "data": ("h5py", "minari", "pandas", "tensorboard"),
     "deep": ("torch",),
     "people": ("pyarrow", "statsmodels"),
-    "recordings": ("av", "pyarrow", "sklearn"),
+    "recordings": ("av", "pyarrow", "sklearn", "threadpoolctl"),
     "remote": ("fsspec", "s3fs"),
     "tune": ("optuna",),
 }
 
 
 @contextmanager
-def optional(use: str) -> Iterator[None]:
+def optional(use: str, extra: str | None = None) -> Iterator[None]:
     """A block that imports an optional library; raises BadInput, which says what to install, if an import fails.
 
-    use: what the user asked for, such as "--dask 127.0.0.1:8786".
+    use: what the user asked for, such as "--dask 127.0.0.1:8786". extra: what installs all that it needs, of the extras that
+    bring the missing library; by default the first of them.
     """
     try:
         yield
@@ -32,14 +33,15 @@ def optional(use: str) -> Iterator[None]:
         library = _missing(error)
         if library is None:
             raise BadInput(f"{use}: a library that it needs cannot be loaded: {error}") from None
-        extra = next((name for name, libraries in EXTRAS.items() if library in libraries), None)
+        bringing = [name for name, libraries in EXTRAS.items() if library in libraries]
+        extra = extra if extra in bringing else next(iter(bringing), None)
         command = f"pip install '.[{extra}]' in a checkout of the lab" if extra else f"pip install {library}"
         raise BadInput(f"{use}: the library '{library}' is not installed: {command}") from None
 
 
-def require(use: str, *libraries: ModuleType) -> None:
+def require(use: str, *libraries: ModuleType, extra: str | None = None) -> None:
     """Loads libraries of `lab.lazy`; raises BadInput as `optional` does."""
-    with optional(use):
+    with optional(use, extra):
         for library in libraries:
             load(library)
 

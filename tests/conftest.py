@@ -27,6 +27,15 @@ if TYPE_CHECKING:
 
 settings.register_profile("lab", deadline=None, derandomize=bool(os.environ.get("CI")), max_examples=50)
 settings.load_profile("lab")
+settings.register_profile("first cases", settings.get_profile("lab"), max_examples=10)
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--first-cases",
+        action="store_true",
+        help="run the first case of each test alone, with ten examples where a test does not say how many it draws",
+    )
 
 
 def pytest_collection() -> None:
@@ -52,14 +61,22 @@ LONGEST = (  # files of tests, the longest first: begun last, one would keep one
 
 def pytest_configure(config: pytest.Config) -> None:
     """Files go to the workers in our order, not by how many tests they hold."""
+    if config.getoption("first_cases"):
+        settings.load_profile("first cases")
     if hasattr(config.option, "loadscopereorder"):
         config.option.loadscopereorder = False
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """The longest files first, each one's tests together and in their order."""
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """The longest files first, each one's tests together and in their order; with --first-cases one case of each."""
     place = {name: n for n, name in enumerate(LONGEST)}
     items.sort(key=lambda item: place.get(item.nodeid.partition("::")[0], len(place)))
+    if config.getoption("first_cases"):
+        first = {item.nodeid.partition("[")[0]: item for item in reversed(items)}
+        kept = [item for item in items if first[item.nodeid.partition("[")[0]] is item]
+        config.hook.pytest_deselected(items=list(set(items) - set(kept)))
+        items[:] = kept
 
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -101,6 +101,8 @@ def not_plain() -> set[str]:
 # ---- each library in turn -----------------------------------------------------------------------------------------
 
 REPLAY = ("replay", "kept")
+DATASET = "from pathlib import Path; from lab.recordings.lerobot_tables import task_texts; task_texts(Path('tasks'))"
+PICTURE = r"from lab.recordings.video import decoded_picture; decoded_picture(b'\xff\xd8', 'x')"
 TABLE = "import lab; lab.teach('world-1', advisor=None, episodes=2).{}"
 
 
@@ -151,6 +153,8 @@ def test_a_command_says_what_to_install(
             "import lab; lab.tune('world-1', trials=2, sessions=2)",
             "tuning: {} '.[tune]' in a checkout of the lab",
         ),
+        ("pyarrow", DATASET, "'tasks': {} '.[recordings]' in a checkout of the lab"),
+        ("av", PICTURE, "x: {} '.[recordings]' in a checkout of the lab"),
     ],
 )
 def test_a_call_says_what_to_install(library: str, code: str, said: str, without: Without) -> None:
@@ -202,13 +206,18 @@ def test_without_all_that_is_not_plain_every_module_can_be_imported(without: Wit
 # ---- what is written down -----------------------------------------------------------------------------------------
 
 
+def import_name(distribution: str) -> str:
+    """The name by which a library is imported."""
+    return {"scikit-learn": "sklearn"}.get(distribution, distribution)
+
+
 def test_the_table_of_extras_is_the_projects() -> None:
     with (ROOT / "pyproject.toml").open("rb") as file:
         project = tomllib.load(file)["project"]
     extras = {
         name: lines for name, lines in project["optional-dependencies"].items() if name not in ("docs", "test", "dev")
     }
-    assert {name: {Requirement(line).name for line in lines} for name, lines in extras.items()} == {
+    assert {name: {import_name(Requirement(line).name) for line in lines} for name, lines in extras.items()} == {
         name: {*libraries} for name, libraries in EXTRAS.items()
     }
 

@@ -1,5 +1,7 @@
 """What the project says of itself: what wheel and sdist take, dependencies, version, the README's set-up commands, .ci/run."""
 
+import os
+import re
 import subprocess
 import sys
 import tomllib
@@ -80,6 +82,19 @@ def test_each_extra_is_tried_alone(project: dict[str, Any], root: Path) -> None:
     """By .ci/plain_wheel.py; those of developers are tried by all else that .ci/run does, and PyTorch is too large."""
     extras = set(project["project"]["optional-dependencies"])
     assert run_path(str(root / ".ci" / "plain_wheel.py"))["EXTRAS"].keys() == extras - {"docs", "test", "dev", "deep"}
+
+
+def test_the_newest_python_runs_the_first_case_of_each_test(root: Path) -> None:
+    """One of each function in a file, also where it has many: what .ci/run asks for there."""
+    assert "--first-cases" in (root / ".ci" / "run").read_text(encoding="utf-8")
+    file = Path("tests", "test_errors.py")
+    asked = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "--collect-only", "-q", "--first-cases"]
+    plain = os.environ | {"PYTEST_ADDOPTS": ""}  # those of .ci/run count lines
+    ran = subprocess.run([*asked, str(file)], cwd=root, env=plain, capture_output=True, text=True, check=True)
+    collected = re.findall(r"::(\w+)", ran.stdout)
+    source = (root / file).read_text(encoding="utf-8")
+    assert "parametrize" in source
+    assert collected == re.findall(r"^def (test_\w+)", source, re.MULTILINE)
 
 
 def test_an_interpreter_is_found_on_path_and_where_pyenv_keeps_it(root: Path, tmp_path: Path) -> None:

@@ -125,6 +125,16 @@ COMMANDS = {  # words after `lab` -> the command
         "lab export toast-run --format jbi",
         more="{words of exporting}",
     ),
+    "clone": Command(
+        "clone",
+        "Clone a skill from demonstrations: roll the student out in physics, let it ask, learn the corrections, and again.",
+        "lab clone grasp --rounds 3 --out grasp-clone",
+    ),
+    "mentor": Command(
+        "mentor",
+        "Compare where rules would have asked with where a person took over in a recording, or keep a mentor for your policy.",
+        "lab mentor my-dataset --report report.html",
+    ),
     "see": Command(
         "see",
         "Picture to grid: find the gripper (magenta), the machine's marker (cyan) and the obstacles (green).",

@@ -31,8 +31,15 @@ if TYPE_CHECKING:
     from lab.classroom.holding import attend, begun_words, closing, place_of
     from lab.classroom.roster import Roster
     from lab.classroom.study import Study as StudyWithPeople
-    from lab.export import FORMATS
+    from lab.cloning.kept_cloning import KeptOptions as KeptCloningOptions
+    from lab.cloning.kept_cloning import check_new as check_new_cloning
+    from lab.cloning.kept_cloning import options_of as cloning_options_of
+    from lab.cloning.kept_cloning import rounds_of
+    from lab.cloning.rounds import CloningOptions
+    from lab.cloning.skill_problem import SkillProblem
+    from lab.export import FORMATS, DatasetFormat
     from lab.export.commands import Path as Lines
+    from lab.export.lerobot import RunRecord
     from lab.export.play import deviation
     from lab.export.program import POSITIONS, Options, Program
     from lab.files import check_out, tasks_folder, write_whole
@@ -42,6 +49,9 @@ if TYPE_CHECKING:
     from lab.learning.selection import SELECTIONS
     from lab.learning.settings import USUAL
     from lab.learning.updates import UPDATES
+    from lab.mentor.doubts import DOUBTS
+    from lab.mentor.mentor import Mentor
+    from lab.mentor.takeovers import RULES, RulesCompared, rules_compared
     from lab.plugins.code_file import is_file_word, take
     from lab.production import load_run
     from lab.production.composer import Conditions
@@ -55,9 +65,11 @@ if TYPE_CHECKING:
     from lab.production.publication import CARD, publish, write_card
     from lab.production.run import run as run_task
     from lab.production.run_advice import RunAdvice
+    from lab.production.run_film import RunFilm, by_hand_s
     from lab.production.run_journal import RunJournal, is_run, replayed_run
     from lab.production.run_options import RunOptions, begun, kept_task
     from lab.production.run_options import gone_on as run_gone_on
+    from lab.recordings.lerobot_read import read as read_recording
     from lab.seat.language_model import language_models
     from lab.seat.lesson_seat import LessonSeat
     from lab.seat.page.finding_page import FindingPage
@@ -93,7 +105,7 @@ if TYPE_CHECKING:
     from lab.tasks.instances import INSTANCES, pyjobshop
     from lab.tasks.instances import InstanceRequest as InstanceAsked
     from lab.tasks.new_task import MACHINE, Changes, file_of, new_task
-    from lab.tasks.record import write_whole as write_task_text
+    from lab.tasks.record import write_whole as write_text
     from lab.tasks.robot_fields import MODELS
     from lab.tasks.schedule_table import read_schedule
     from lab.tasks.schema import page_of, schema_of
@@ -123,6 +135,7 @@ if TYPE_CHECKING:
     from lab.view.canvas import check_picture
     from lab.view.cell_plan import draw_cell
     from lab.view.cyclic_summary import cyclic_summary
+    from lab.view.mentor_report import COLUMNS, report_document, report_page, table_lines
     from lab.view.meshcat import LiveView, replay_html
     from lab.view.movie import write_movie
     from lab.view.progress import EscapingConsole, counting
@@ -181,9 +194,18 @@ TABLE = {
     "lab.classroom.holding": ("attend", "begun_words", "closing", "place_of"),
     "lab.classroom.roster": ("Roster",),
     "lab.classroom.study": ("Study as StudyWithPeople",),
-    "lab.export": ("FORMATS",),
+    "lab.cloning.kept_cloning": (
+        "KeptOptions as KeptCloningOptions",
+        "check_new as check_new_cloning",
+        "options_of as cloning_options_of",
+        "rounds_of",
+    ),
+    "lab.cloning.rounds": ("CloningOptions",),
+    "lab.cloning.skill_problem": ("SkillProblem",),
+    "lab.export": ("FORMATS", "DatasetFormat"),
     "lab.export.commands": ("Path as Lines",),
     "lab.export.program": ("Options", "POSITIONS", "Program"),
+    "lab.export.lerobot": ("RunRecord",),
     "lab.export.play": ("deviation",),
     "lab.files": ("check_out", "tasks_folder", "write_whole"),
     "lab.gym": ("parse_name",),
@@ -192,6 +214,9 @@ TABLE = {
     "lab.learning.selection": ("SELECTIONS",),
     "lab.learning.settings": ("USUAL",),
     "lab.learning.updates": ("UPDATES",),
+    "lab.mentor.doubts": ("DOUBTS",),
+    "lab.mentor.mentor": ("Mentor",),
+    "lab.mentor.takeovers": ("RULES", "RulesCompared", "rules_compared"),
     "lab.plugins.code_file": ("is_file_word", "take"),
     "lab.production": ("load_run",),
     "lab.production.composer": ("Conditions",),
@@ -205,6 +230,7 @@ TABLE = {
     "lab.production.publication": ("CARD", "publish", "write_card"),
     "lab.production.run": ("run as run_task",),
     "lab.production.run_advice": ("RunAdvice",),
+    "lab.production.run_film": ("RunFilm", "by_hand_s"),
     "lab.production.run_journal": ("is_run", "replayed_run", "RunJournal"),
     "lab.production.run_options": ("begun", "kept_task", "gone_on as run_gone_on", "RunOptions"),
     "lab.seat.language_model": ("language_models",),
@@ -220,6 +246,7 @@ TABLE = {
     "lab.seat.terminal.prompt": ("TeachingPrompt",),
     "lab.seat.terminal.replay_keys": ("HELP as KEYS_HELP", "replay_keys"),
     "lab.seat.terminal.subtask_questions": ("accepted_by",),
+    "lab.recordings.lerobot_read": ("read as read_recording",),
     "lab.sequencing": ("SEQUENCERS",),
     "lab.sequencing.cell.objectives": ("OBJECTIVES",),
     "lab.sequencing.methods.srl_advised": ("FITTING",),
@@ -240,7 +267,7 @@ TABLE = {
     "lab.tasks.grid_world": ("write_random",),
     "lab.tasks.instances": ("InstanceRequest as InstanceAsked", "INSTANCES", "pyjobshop"),
     "lab.tasks.new_task": ("Changes", "file_of", "MACHINE", "new_task"),
-    "lab.tasks.record": ("write_whole as write_task_text",),
+    "lab.tasks.record": ("write_whole as write_text",),
     "lab.tasks.robot_fields": ("MODELS",),
     "lab.tasks.schedule_table": ("read_schedule",),
     "lab.tasks.schema": ("page_of", "schema_of"),
@@ -267,6 +294,7 @@ TABLE = {
     "lab.view.cell_plan": ("draw_cell",),
     "lab.view.cyclic_summary": ("cyclic_summary",),
     "lab.view.progress": ("counting", "EscapingConsole"),
+    "lab.view.mentor_report": ("COLUMNS", "report_document", "report_page", "table_lines"),
     "lab.view.meshcat": ("LiveView", "replay_html"),
     "lab.view.movie": ("write_movie",),
     "lab.view.schedule_scene": ("scene_of",),

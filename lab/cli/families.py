@@ -75,9 +75,13 @@ def _of_export() -> Tables:
     return {"export formats": deferred.FORMATS}
 
 
+def _of_mentor() -> Tables:
+    return {"doubts": deferred.DOUBTS}
+
+
 def members(family: str) -> Mapping[str, Any] | Sequence[str]:
     """The table of a family, such as "gates", or its names; only the tables needed for it are loaded."""
-    for room in (_of_studies, _of_teaching, _of_sequencing, _of_tasks, _of_export):
+    for room in (_of_studies, _of_teaching, _of_sequencing, _of_tasks, _of_export, _of_mentor):
         if family in (family_room := room()):
             return family_room[family]
     raise KeyError(family)

@@ -70,7 +70,7 @@ def new(
     else:
         wanted = deferred.ask(task_name, deferred.default_reader(console(), moves=False), console())
     text, task = deferred.new_cell(wanted, path)
-    deferred.write_task_text(path, text)
+    deferred.write_text(path, text)
 
     def told(d: dict[str, Any]) -> str:
         there = f"{counted(d['parts'], 'part')} and {counted(d['stations'], 'station')} around the arm {wanted.arm}"

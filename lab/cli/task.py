@@ -54,7 +54,7 @@ def task_schema(
         return
     if out.suffix not in (".json", ".md"):
         raise BadInput(f"file '{out}' (--out): wanted one that ends with .json or .md")
-    deferred.write_task_text(
+    deferred.write_text(
         out, deferred.page_of(kind) if out.suffix == ".md" else json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
     )
     hint = "" if out.suffix == ".md" else f"; as the first line of a {kind} file: #:schema {out}"
@@ -89,7 +89,7 @@ def task_convert(
         else deferred.toml_of(cell_file)
     )
     if out is not None:
-        deferred.write_task_text(out, text)
+        deferred.write_text(out, text)
     parts, robots_there = len(cell_file.ordered()), len(cell_file.built_robots)
     document = {
         "file": None if out is None else str(out),

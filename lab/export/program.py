@@ -31,12 +31,13 @@ class Options:
     """The options of an export.
 
     positions: of job files, rectangular or in pulses. date: in their headers, yyyy/mm/dd hh:mm. any_arm: whether programs
-    are also written for arms of other makers than the controller's.
+    are also written for arms of other makers than the controller's. fps: steps a second of a dataset.
     """
 
     positions: Literal["rectan", "pulse"] = "rectan"
     date: str = "2000/01/01 00:00"
     any_arm: bool = False
+    fps: int = 30
 
     def check_arm(self, form: str, maker: str, names: str, arm: str, *, level: bool) -> None:
         """Raise BadInput for an arm whose name does not match the maker's `names`, unless any arm is allowed; or a level tool."""

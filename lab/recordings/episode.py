@@ -35,6 +35,11 @@ class Episode:
     success: whether the task was done at the end; None if nobody recorded that.
     pictures: by camera, such as "overhead". extra: by name of the feature, other arrays (n, ...), such as "next.reward".
     Raises BadInput if the lengths differ or a value is not finite.
+
+        >>> import lab, numpy as np
+        >>> states, actions = np.zeros((4, 2), np.float32), np.ones((4, 1), np.float32)
+        >>> lab.Episode("press", states, actions, np.array([False, True, True, False])).takeovers()
+        [(1, 3)]
     """
 
     task: str
@@ -58,6 +63,12 @@ class Episode:
     def __len__(self) -> int:
         return len(self.states)
 
+    def part(self, start: int, end: int, success: bool | None) -> "Episode":
+        """The steps from `start` to before `end`, without pictures, as an episode of that success."""
+        own = slice(start, end)
+        extra = {name: values[own] for name, values in self.extra.items()}
+        return Episode(self.task, self.states[own], self.actions[own], self.corrected[own], success, extra=extra)
+
     def takeovers(self) -> list[tuple[int, int]]:
         """The first step and the step after the last of each stretch in which a teacher gave the actions."""
         edges = np.flatnonzero(np.diff(np.concatenate([[False], self.corrected, [False]]).astype(np.int8)))
@@ -70,6 +81,11 @@ class Recording:
 
     robot: its type, such as "so101_follower"; state_names (d,), action_names (k,): what the numbers are.
     Raises BadInput if an episode has other widths than the names.
+
+        >>> import lab, numpy as np
+        >>> still = lab.Episode("wait", np.zeros((4, 2), np.float32), np.zeros((4, 1), np.float32), np.zeros(4, bool))
+        >>> len(lab.Recording(30, "cart", ("x", "y"), ("speed",), [still]).episodes)
+        1
     """
 
     fps: int

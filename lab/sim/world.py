@@ -167,6 +167,13 @@ class World:
         )
         self._fixed(name, -1, visual, position, NO_TURN, Shape("cylinder", (radius, height), None, rgba))
 
+    def show(self, name: str, looks: Sequence[Shape]) -> None:
+        """A body at the origin that is only seen, and collides with nothing; `put` moves it."""
+        with silence():
+            visual = seen_of(self._p, self._call, looks)
+        number = self._call("createMultiBody", 0, -1, visual, [0.0, 0.0, 0.0], list(NO_TURN))
+        self._add(name, _Entry(number, False, ((0.0, 0.0, 0.0), NO_TURN), looks={"": tuple(looks)}))
+
     def _fixed(self, name: str, shape: int, visual: int, position: Position, turn: Position, look: Shape) -> None:
         number = self._call("createMultiBody", 0, shape, visual, list(position), list(turn))
         self._add(name, _Entry(number, False, (tuple(position), tuple(turn)), looks={"": (look,)}))
@@ -179,7 +186,7 @@ class World:
         entry = _Entry(-1, True, (tuple(position), turn), looks={"": shape.looks}, turn=shape.turn)
         body = self._turned(turn, shape.turn)
         with silence():
-            solid, seen = solid_of(self._p, self._call, shape), seen_of(self._p, self._call, shape)
+            solid, seen = solid_of(self._p, self._call, shape), seen_of(self._p, self._call, shape.looks, shape.turn)
             entry.number = self._call("createMultiBody", mass_kg, solid, seen, list(position), list(body))
         moments, rolling = (
             [float(f"{moment * mass_kg:.12g}") for moment in shape.inertia_m2],
@@ -239,6 +246,24 @@ class World:
             at, turn = self._p.multiplyTransforms(list(at), list(turn), *off)
         self._call("resetBasePositionAndOrientation", entry.number, list(at), list(turn))
         entry.pose = (tuple(position), tuple(quaternion))
+
+    def remove(self, name: str) -> None:
+        """Take a body out of the world, with its contacts; a body that is added next gets its place in the engine."""
+        number = self._bodies.pop(name).number
+        del self._names[number]
+        self._call("removeBody", number)
+
+    def forget_contacts(self, name: str) -> None:
+        """Lets the engine recompute, at its next step, all contacts of a body's links, in the order of a new world."""
+        entry = self._bodies[name]
+        for link in entry.links.values():
+            self._call("setCollisionFilterGroupMask", entry.number, link, GROUP, ALL)
+
+    def touched(self, name: str) -> set[str]:
+        """The names of the bodies that a body touched in the last step."""
+        number = self._bodies[name].number
+        points = self._call("getContactPoints", number)
+        return {self._names[n] for point in points for n in point[1:3] if n in self._names and n != number}
 
     def names(self) -> list[str]:
         """All bodies, in the order in which they came."""

@@ -25,7 +25,7 @@ def encode(policy: Policy) -> bytes:
     """The bytes of a policy's file; the same policy always gives the same bytes."""
     metadata = {name: json.dumps(getattr(policy, name), allow_nan=False) for name in _METADATA}
     tensors = {name: np.ascontiguousarray(getattr(policy, name)) for name in _TENSORS}
-    return _ordered(save(tensors, {"format": FORMAT, **metadata}))
+    return ordered(save(tensors, {"format": FORMAT, **metadata}))
 
 
 def decode(content: bytes, where: str) -> Policy:
@@ -50,10 +50,10 @@ def described(policy: Policy) -> dict[str, Any]:
     return {**values, "states": states, "actions": actions, "episodes": len(policy.curve)}
 
 
-def _ordered(content: bytes) -> bytes:
+def ordered(content: bytes) -> bytes:
     """The file with a sorted header, because the library writes metadata in arbitrary order."""
     data = content[8 + _header_bytes(content) :]
-    header = json.dumps(_header(content), sort_keys=True, separators=(",", ":")).encode()
+    header = json.dumps(header_of(content), sort_keys=True, separators=(",", ":")).encode()
     header += b" " * (-len(header) % 8)  # tables begin at a multiple of 8 bytes
     return struct.pack("<Q", len(header)) + header + data
 
@@ -63,7 +63,8 @@ def _header_bytes(content: bytes) -> int:
     return length
 
 
-def _header(content: bytes) -> dict[str, Any]:
+def header_of(content: bytes) -> dict[str, Any]:
+    """The header of a safetensors file that the library has read."""
     header = json.loads(content[8 : 8 + _header_bytes(content)])
     assert isinstance(header, dict)  # the library has already read it
     return header
@@ -71,7 +72,7 @@ def _header(content: bytes) -> dict[str, Any]:
 
 def _read(content: bytes) -> tuple[dict[str, np.ndarray[Any, Any]], dict[str, str]]:
     tensors: dict[str, np.ndarray[Any, Any]] = load(content)
-    header = _header(content)
+    header = header_of(content)
     metadata = header.get("__metadata__") or {}
     if metadata.get("format") != FORMAT:
         raise ValueError(f"format {metadata.get('format')!r}, allowed '{FORMAT}'")

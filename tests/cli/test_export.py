@@ -74,6 +74,34 @@ def test_people_are_told_in_two_lines(lab: Lab, run: Path) -> None:
     assert [path.name for path in Path("there").iterdir()] == ["trajectory.csv"]
 
 
+def test_a_dataset_is_written_read_back_and_told(lab: Lab, run: Path) -> None:
+    ran = lab("export", str(run), "--format", "lerobot", "--fps", "10", "--json")
+    assert ran.code == 0, ran.err
+    assert ran.err == "lab: 'toast-run' (RUN): no journal in it: the dataset has no pictures\n"
+    assert {name: ran.json[name] for name in ("task", "arm", "format", "folder", "episodes", "fps")} == {
+        "task": "toast",
+        "arm": "up6",
+        "format": "lerobot",
+        "folder": str(run / "lerobot"),
+        "episodes": 1,
+        "fps": 10,
+    }
+    assert (ran.json["equal"], ran.json["faults"], ran.json["corrected_steps"], ran.json["pictures"]) == (
+        True,
+        [],
+        0,
+        False,
+    )
+    assert json.loads((run / "lerobot/meta/info.json").read_text(encoding="utf-8"))["total_frames"] == ran.json["steps"]
+    ran = lab("export", str(run), "--format", "lerobot", "--pictures", "0")
+    assert (ran.code, ran.err) == (
+        2,
+        f"lab: '{run / 'lerobot'}': it exists already; a dataset is written to a new folder\n",
+    )
+    ran = lab("export", str(run), "--format", "lerobot", "--pictures", "0", "--out", "there")
+    assert ran.out.splitlines()[1] == "read back: states, actions and tasks equal; no pictures"
+
+
 def test_pulses_are_written_when_they_are_asked_for(lab: Lab, run: Path) -> None:
     assert lab("export", str(run), "--format", "jbi", "--positions", "pulse").code == 0
     assert "///POSTYPE PULSE" in (run / "jbi" / "M001.JBI").read_text(encoding="utf-8")
@@ -84,12 +112,13 @@ def test_pulses_are_written_when_they_are_asked_for(lab: Lab, run: Path) -> None
     [
         (
             "toast-run --format jbii",
-            "unknown format 'jbii' (--format): did you mean 'jbi'? known: csv, jbi, json, urscript",
+            "unknown format 'jbii' (--format): did you mean 'jbi'? known: csv, jbi, json, lerobot, urscript",
         ),
         (
             "toast-run --format jbi --positions puls",
             "unknown sort of positions 'puls' (--positions): did you mean 'pulse'?",
         ),
+        ("toast-run --format lerobot --pictures 64", "'toast-run' (RUN): no journal in it"),
         ("nowhere --format jbi", f"'nowhere' (RUN): no {PROGRAM} in it; give the folder of a `lab run` (its --out)"),
         (f"toast-run --format jbi --out toast-run/{PROGRAM}", f"'toast-run/{PROGRAM}' is a file; give a folder"),
     ],

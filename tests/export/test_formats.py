@@ -3,10 +3,11 @@
 import pytest
 
 from lab.errors import BadInput
-from lab.export import FORMATS
+from lab.export import program_formats
 from lab.export.play import deviation
 from lab.export.program import Options, Program
 
+FORMATS = program_formats()
 NEEDS_AXES = {"urscript": 6}
 
 

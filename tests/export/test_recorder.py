@@ -6,7 +6,7 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from lab.export import FORMATS
+from lab.export import program_formats
 from lab.export.play import deviation
 from lab.export.program import ArmRest, Motion, Options, Press, Program
 from lab.export.recorder import SEEN_EVERY, MotionRecorder, tips
@@ -126,7 +126,7 @@ def test_a_target_that_is_set_in_the_very_step_of_a_stop_is_none(robot: RobotArm
     assert program.carried.actions[1].at_s == pytest.approx(30 * TIME_STEP)
 
 
-@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize("name", program_formats())
 def test_a_run_that_was_stopped_is_exported_with_its_stop(robot: RobotArm, name: str) -> None:
     """An emergency stop at full speed; the arm stays for a while, and goes on to somewhere else."""
     recorder = MotionRecorder(robot)
@@ -136,7 +136,9 @@ def test_a_run_that_was_stopped_is_exported_with_its_stop(robot: RobotArm, name:
         robot.world.step()
     run(robot, robot.follow([HIGH.shifted(dz=-0.1)]))
     program = written(recorder)
-    off = deviation(program, FORMATS[name].read(FORMATS[name].write(program, Options(any_arm=True)), UP6))
+    off = deviation(
+        program, program_formats()[name].read(program_formats()[name].write(program, Options(any_arm=True)), UP6)
+    )
     ways = 1 if name in ("jbi", "urscript") else 2  # a job goes on where it was stopped
     assert (off.motions, off.near_enough) == (ways, True), off
 

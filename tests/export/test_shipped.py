@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from lab.export import FORMATS
+from lab.export import program_formats
 from lab.export.program import Options, Program
 from tests.export.job_text import Stretch, farthest, moves, script_stretches, stretches
 from tests.export.test_job_text import dense, ways_of
@@ -19,7 +19,7 @@ TASKS, MOST_MOVES = ("kit", "breakfast"), 20  # a transfer
 
 def jobs(program: Program, form: str) -> list[tuple[int, list[Stretch]]]:
     """Of each transfer, and of what came after the last one: how many moves it has, and which."""
-    files = FORMATS[form].write(program, Options(any_arm=True))
+    files = program_formats()[form].write(program, Options(any_arm=True))
     if form == "jbi":
         return [(moves(text), stretches(text)) for name, text in sorted(files.items()) if re.match(r"M\d", name)]
     (text,) = files.values()

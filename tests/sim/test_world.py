@@ -272,6 +272,20 @@ def test_a_part_that_is_put_somewhere_rests_there(world: World) -> None:
     assert world.pose("it")[0][2] == pytest.approx(1.0, abs=1e-3)  # g dt^2 = 0.17 mm of its fall
 
 
+def test_a_body_that_is_removed_is_gone_and_its_name_is_free(world: World) -> None:
+    world.box("table", (1, 1, 0.1), (0, 0, -0.05), WOOD)
+    for _ in range(2):
+        world.load("slice", SLICE, (0, 0, 0.061), fixed=False)
+        for _ in range(30):
+            world.step()
+        assert world.touched("slice") == {"table"}
+        assert world.touched("table") == {"slice"}
+        world.remove("slice")
+        world.step()
+        assert world.names() == ["table"]
+        assert world.touched("table") == set()
+
+
 def test_a_covered_camera_sees_black_and_then_again(world: World) -> None:
     world.box("table", (1, 1, 0.1), (0, 0, 0), (1.0, 1.0, 1.0, 1.0))
     camera = Camera.overhead((0, 0, 1.0), 0.5, 32)

@@ -125,11 +125,15 @@ class RobotArm:
         if fine:
             world.at_least(_FINE_ITERATIONS)
         self._free = [joint for joint in fingers.joints if joint not in fingers.driven]
-        self.closed = self._let_go = False
         self.listener: MotionListener | None = None
+        self.wait_open()
+
+    def wait_open(self) -> None:
+        """Put the arm where it waits, with open fingers, at once, as when it was loaded."""
+        self.closed = self._let_go = False
         self._touched_at = 0.0  # the tool's yaw [rad] when the contacts of the held part were last recomputed
         self._half_on = False  # whether the tool is half a turn away from the requested yaw
-        self.hold(arm.home)
+        self.hold(self.arm.home)
         self.open_at_once()
 
     def hold(self, joints: Array) -> None:
@@ -211,12 +215,9 @@ class RobotArm:
         heard = self.listener
         if heard is not None:
             heard.began(poses, max(blends), way, before)
-        for row, (position, velocity) in enumerate(zip(way.positions, way.velocities, strict=True)):
-            self._lead(position, velocity)
+        for row, _ in enumerate(self.along(way)):
             if heard is not None:
                 heard.drives(row)
-            if self.closed and row % _TOUCH_STEPS == 0:
-                self._touch_anew()
             yield
         self._lead(way.positions[-1])
         if heard is not None:
@@ -224,6 +225,14 @@ class RobotArm:
         yield from _stay(_SETTLE_STEPS)
         if heard is not None:
             heard.ended()
+
+    def along(self, way: Trajectory) -> Iterator[None]:
+        """Set the rows of a trajectory as targets, one a physics step, without a rest at its end: for streamed motions."""
+        for row, (position, velocity) in enumerate(zip(way.positions, way.velocities, strict=True)):
+            self._lead(position, velocity)
+            if self.closed and row % _TOUCH_STEPS == 0:
+                self._touch_anew()
+            yield
 
     def _touch_anew(self) -> None:
         """Lets physics recompute the contacts of the held part after the tool has turned with it."""

@@ -307,18 +307,21 @@ def solid_of(engine: Any, call: Call, shape: PartShape) -> int:
     return int(call("createCollisionShape", engine.GEOM_MESH, vertices=shape.inner[0].tolist()))
 
 
-def seen_of(engine: Any, call: Call, shape: PartShape) -> int:
-    """PyBullet's number of a part's visual shape; of meshes in text, which PyBullet cannot read, only the first is used."""
-    back = engine.invertTransform([0, 0, 0], list(shape.turn))[1]
-    places = [engine.multiplyTransforms([0, 0, 0], back, look.position, look.quaternion) for look in shape.looks]
-    if (corners := text_corners(shape.looks[0].mesh)) is not None:
-        look = shape.looks[0]
+def seen_of(engine: Any, call: Call, looks: Sequence[Shape], turn: Sequence[float] = (0.0, 0.0, 0.0, 1.0)) -> int:
+    """PyBullet's number of a visual shape, whose axes are turned by `turn` (quaternion xyzw) against those of the body.
+
+    Of meshes in text, which PyBullet cannot read, only the first is used.
+    """
+    back = engine.invertTransform([0, 0, 0], list(turn))[1]
+    places = [engine.multiplyTransforms([0, 0, 0], back, look.position, look.quaternion) for look in looks]
+    if (corners := text_corners(looks[0].mesh)) is not None:
+        look = looks[0]
         place = dict(zip(("visualFramePosition", "visualFrameOrientation"), places[0], strict=True))
         corners, faces = corners * (look.size or (1.0, 1.0, 1.0)), list(range(len(corners)))
         place |= {"vertices": corners.tolist(), "indices": faces, "rgbaColor": look.rgba}
         return int(call("createVisualShape", engine.GEOM_MESH, **place))
-    arrays = visual_arrays(shape.looks)
-    kinds = [getattr(engine, f"GEOM_{look.kind.upper()}") for look in shape.looks]
+    arrays = visual_arrays(looks)
+    kinds = [getattr(engine, f"GEOM_{look.kind.upper()}") for look in looks]
     at, turns = (
         [list(values) for values in ways] for ways in zip(*places, strict=True)
     )  # PyBullet crashes over tuples

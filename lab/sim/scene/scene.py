@@ -76,6 +76,12 @@ class Scene:
             self.kind_of[body] = own
             foot = foot.raised(shape.height_m + ABOVE_FOOT_M)
 
+    def remove_parts(self) -> None:
+        """Takes all parts out of the scene, the last one first: those added next get the same numbers in the engine again."""
+        for body in reversed(self.kind_of):
+            self.world.remove(body)
+        self.kind_of.clear()
+
     def body_of(self, name: str, kind: str) -> str:
         """The body that the gripper holds when it carries part `name` as this kind: the part itself, or its pallet."""
         return name if self.kinds[kind].part.routes else pallet_of(name)

@@ -252,3 +252,18 @@ def _hangs(robot: RobotArm, world: World) -> np.ndarray:
     tool, at = robot.tool(), world.pose("slice")[0] - (robot.tool().x, robot.tool().y, robot.tool().z)
     c, s = cos(tool.yaw), sin(tool.yaw)
     return np.array([c * at[0] + s * at[1], -s * at[0] + c * at[1], at[2]])
+
+
+def test_a_streamed_trajectory_ends_with_its_last_row(robot: RobotArm, world: World) -> None:
+    """There is a step for each row and none for a rest; an arm that is put where it waits is as it was loaded."""
+    home = robot.arm.home
+    rows = home + np.linspace(0.0, 0.05, 25)[1:, None] * np.eye(6)[0]
+    way = Trajectory(rows, np.full((24, 1), 0.5) * np.eye(6)[0])
+    assert steps(world, robot.along(way)) == 24
+    joints = world.joints(NAME, robot.arm.joints)
+    assert joints[0] == pytest.approx(0.05, abs=0.005)
+    steps(world, robot.grip())
+    robot.wait_open()
+    assert world.joints(NAME, robot.arm.joints) == pytest.approx(home)
+    assert not robot.closed
+    assert world.joints(NAME, FINGERS) == pytest.approx(robot.arm.fingers.at(robot.arm.fingers.open_m))

@@ -55,6 +55,22 @@ def test_a_built_scene_holds_everything_and_stays_as_it_was_put(task: Task, worl
         assert tuple(world.pose(obstacle.name)[0][:2]) == place
 
 
+def test_parts_that_are_removed_and_added_again_stand_as_before_bit_for_bit(fms: Task, world: World) -> None:
+    """Also a part on its pallet, whose two bodies get their old numbers in the engine."""
+    scene = Scene(world, fms, (), as_written(fms))
+    spot, poses = scene.places.begins(("rook",))[0], []
+    for _ in range(2):
+        scene.add("rook 1", "rook on pallet", spot)
+        for _ in range(40):
+            world.step()
+        poses.append([world.pose(body) for body in ("rook 1's pallet", "rook 1")])
+        scene.remove_parts()
+        assert not set(world.names()) & {"rook 1's pallet", "rook 1"}
+    assert np.array_equal(
+        np.concatenate([*map(np.concatenate, poses[0])]), np.concatenate([*map(np.concatenate, poses[1])])
+    )
+
+
 def test_each_part_is_held_by_a_force_of_its_own(world: World) -> None:
     """A slice of 5 g is taken with 150 N/kg, a cup of 1.5 kg in the same task with 61.9 N: 6 x 1.5 kg x 11.01 m/s2 / 1.6."""
     task, masses = load("breakfast"), {"slice": 0.005, "cup": 1.5}

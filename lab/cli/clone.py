@@ -1,0 +1,130 @@
+"""`lab clone`: a student of demonstrations that asks where its mentor doubts."""
+
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from lab.cli import deferred
+from lab.cli.families import offers
+from lab.cli.options import Json, Seed
+from lab.cli.output import console, show
+from lab.errors import BadInput, counted
+from lab.lazy import rich
+
+
+def clone(
+    skill: Annotated[
+        str | None, typer.Argument(help="A skill of the task, or a sub-task: grasp, insert, place, transfer.")
+    ] = None,
+    task: Annotated[str, typer.Option("--task", help="A task that ships, or a .toml file.")] = "toast",
+    demonstrations: Annotated[
+        int, typer.Option("--demonstrations", min=1, max=10_000, help="Episodes of the teacher at the start.")
+    ] = 15,
+    rounds: Annotated[int, typer.Option("--rounds", min=0, max=1000, help="Rounds of asking and learning again.")] = 4,
+    questions: Annotated[
+        int, typer.Option("--questions", min=1, max=100_000, help="Takeovers in a round, at most.")
+    ] = 10,
+    rule: Annotated[
+        str, typer.Option("--rule", help="When it asks: {doubts}.", autocompletion=offers("doubts"))
+    ] = "distance",
+    false_alarms: Annotated[
+        float, typer.Option("--false-alarms", help="Share of the episodes that would succeed in which it may ask.")
+    ] = 0.2,
+    noise: Annotated[
+        float, typer.Option("--noise", min=0.0, max=1.0, help="Standard deviation of the disturbance of each action.")
+    ] = 0.1,
+    evaluated: Annotated[
+        int, typer.Option("--evaluated", min=1, max=100_000, help="Episodes by which each round's student is measured.")
+    ] = 30,
+    epochs: Annotated[
+        int, typer.Option("--epochs", min=1, max=100_000, help="Epochs of each student's learning.")
+    ] = 400,
+    resume: Annotated[
+        Path | None,
+        typer.Option("--resume", help="Continue the session in this folder, with its options; more --rounds."),
+    ] = None,
+    seed: Seed = 0,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder for datasets (LeRobot), students, mentors and measurements.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Clone a skill from demonstrations: roll the student out in physics, let it ask, learn the corrections, and again.
+
+    A mentor asks where it doubts; the teacher then takes over for a second. Each round's student is measured in episodes that
+    nothing else has used.
+    """
+    if (skill is None) == (resume is None):
+        raise BadInput("wanted a skill, or --resume DIR; one of the two")
+    if resume is not None:
+        if out is not None:
+            raise BadInput(f"--out beside --resume: the session stays in '{resume}'")
+        kept = deferred.cloning_options_of(resume)
+        kept = replace(kept, options=replace(kept.options, rounds=max(rounds, kept.options.rounds)))
+    else:
+        if out is not None:
+            deferred.check_new_cloning(out)
+        options = deferred.CloningOptions(
+            demonstrations=demonstrations,
+            rounds=rounds,
+            questions=questions,
+            rule=rule,
+            false_alarms=false_alarms,
+            evaluated=evaluated,
+            epochs=epochs,
+            seed=seed,
+        )
+        kept = deferred.KeptCloningOptions(deferred.SkillProblem(task, str(skill), noise), options)
+        kept.problem.env  # noqa: B018  # a task or skill that is unknown is refused before anything is written
+    folder = resume or out
+    measured = list[Any]()
+    try:
+        for session in deferred.rounds_of(kept, folder):
+            measured = session.measured
+            console().print(_line(measured[-1]), markup=False)
+    finally:
+        kept.problem.close()
+    document = {
+        "task": kept.problem.task,
+        "skill": kept.problem.skill,
+        "rule": kept.options.rule,
+        "rounds": [asdict(one) | {"success": one.success} for one in measured],
+        "out": None if folder is None else str(folder),
+    }
+    show(document, as_json, _summary)
+
+
+def _line(measured: Any) -> str:
+    failures = measured.successes.count(False)
+    successes = len(measured.successes) - failures
+    return (
+        f"round {measured.round}: {100 * measured.success:.0f} % of {counted(len(measured.successes), 'episode')} after "
+        f"{counted(measured.questions, 'question')}; its mentor doubts in {measured.warned} of "
+        f"{counted(failures, 'failure')} and in {measured.false_alarms} of {counted(successes, 'success')}"
+    )
+
+
+def _summary(document: dict[str, Any]) -> "rich.console.RenderableType":
+    table = rich.table.Table(box=None, pad_edge=False)
+    for number, name in enumerate(
+        ("round", "success", "questions", "corrected steps", "failures doubted", "lead [steps]")
+    ):
+        table.add_column(name, justify="right" if number else "left")
+    for one in document["rounds"]:
+        leads = sorted(one["lead_steps"])
+        table.add_row(
+            str(one["round"]),
+            f"{100 * one['success']:.0f} %",
+            str(one["questions"]),
+            str(one["corrected_steps"]),
+            f"{one['warned']} of {[*one['successes']].count(False)}",
+            str(leads[len(leads) // 2]) if leads else "–",
+        )
+    below = [f"{document['skill']} of {document['task']}, asking by '{document['rule']}'"]
+    if any(one["rejected"] for one in document["rounds"]):
+        below.append("it asks no more: the takeovers have not helped")
+    if document["out"]:
+        below.append(f"in {document['out']}: demonstrations and corrections as LeRobot datasets, students, mentors")
+    return rich.console.Group(table, rich.text.Text("\n".join(below)))

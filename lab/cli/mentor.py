@@ -1,0 +1,112 @@
+"""`lab mentor`: when a robot's policy should ask, from its recorded episodes."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from lab.cli import deferred
+from lab.cli.families import offers
+from lab.cli.options import Json, Seed
+from lab.cli.output import console, show
+from lab.errors import BadInput, counted
+from lab.lazy import rich
+
+
+def mentor(
+    dataset: Annotated[Path, typer.Argument(help="The folder of a LeRobot dataset (format v3).")],
+    report: Annotated[
+        Path | None, typer.Option("--report", help="File (.html) for a page with curves, episodes and pictures.")
+    ] = None,
+    window_s: Annotated[
+        float,
+        typer.Option("--window", min=0.01, max=600, help="Seconds before a takeover in which an alarm warns of it."),
+    ] = 3.0,
+    false_alarms: Annotated[
+        float, typer.Option("--false-alarms", help="Share of the episodes without need in which a rule may ask.")
+    ] = 0.1,
+    keep: Annotated[
+        Path | None,
+        typer.Option("--keep", help="File for a mentor that has learned from DATASET, calibrated by --rollouts."),
+    ] = None,
+    rollouts: Annotated[
+        Path | None,
+        typer.Option("--rollouts", help="For --keep: a dataset of the policy's rollouts without a teacher."),
+    ] = None,
+    rule: Annotated[
+        str, typer.Option("--rule", help="For --keep, the measure of doubt: {doubts}.", autocompletion=offers("doubts"))
+    ] = "distance",
+    seed: Seed = 0,
+    as_json: Json = False,
+) -> None:
+    """Compare where rules would have asked with where a person took over in a recording, or keep a mentor for your policy.
+
+    Takeovers are steps that the dataset marks by its feature 'intervention'.
+    """
+    if (keep is None) != (rollouts is None):
+        raise BadInput("--keep and --rollouts: wanted both, or neither")
+    if keep is not None and report is not None:
+        raise BadInput("--report beside --keep: a report compares rules: leave one of them away")
+    for path, option in ((report, "--report"), (keep, "--keep")):
+        if path is not None and (path.is_dir() or not path.parent.is_dir()):
+            raise BadInput(f"file '{path}' ({option}): wanted a file in a folder that exists")
+    recording = deferred.read_recording(dataset)
+    if keep is not None and rollouts is not None:
+        show(_kept(recording, rollouts, keep, rule, false_alarms, seed), as_json, _kept_summary)
+        return
+    with deferred.counting(console(), "rules compared") as progress:
+        done = iter(range(len(deferred.RULES)))
+        compared = deferred.rules_compared(
+            recording,
+            window_s=window_s,
+            false_alarms=false_alarms,
+            seed=seed,
+            progress=lambda name: progress(next(done), len(deferred.RULES)),
+        )
+    document = deferred.report_document(compared) | {"report": None if report is None else str(report)}
+    if report is not None:
+        deferred.write_text(report, deferred.report_page(compared, dataset.resolve().name))
+    show(document, as_json, lambda _: _summary(compared, report))
+
+
+def _kept(recording: Any, rollouts: Path, keep: Path, rule: str, false_alarms: float, seed: int) -> dict[str, Any]:
+    """The document of a mentor, after it was learned, calibrated and written."""
+    alone = deferred.read_recording(rollouts)
+    made = deferred.Mentor.learn(recording, rule, rollouts=alone.episodes, seed=seed)
+    made.calibrate(alone.episodes, false_alarms=false_alarms)
+    made.save(keep)
+    promise = made.promise
+    assert promise is not None
+    return {
+        "mentor": str(keep),
+        "rule": rule,
+        "threshold": promise.threshold,
+        "false_alarms": promise.share,
+        "expected": promise.expected,
+        "in_95": promise.in_95,
+        "successes": promise.episodes,
+    }
+
+
+def _kept_summary(document: dict[str, Any]) -> "rich.console.RenderableType":
+    return rich.text.Text(
+        f"{document['mentor']}: asks where the doubt by '{document['rule']}' is above {document['threshold']:.3g}\n"
+        f"promised: of the episodes that would succeed, at most {100 * document['false_alarms']:g} % with a question, by "
+        f"{counted(document['successes'], 'success')}; on average {100 * document['expected']:.1f} %, and in 95 % of such "
+        f"calibrations below {100 * document['in_95']:.1f} %"
+    )
+
+
+def _summary(compared: "deferred.RulesCompared", report: Path | None) -> "rich.console.RenderableType":
+    table = rich.table.Table(box=None, pad_edge=False)
+    for number, name in enumerate(deferred.COLUMNS):
+        table.add_column(name, justify="right" if number else "left")
+    for line in deferred.table_lines(compared):
+        table.add_row(*line)
+    below = [
+        f"a takeover was warned of, and an alarm right, if the alarm began in the {compared.window_s:g} s before it",
+        "by chance: as many alarms at random steps",
+        *compared.notes,
+        *([f"page: {report}"] if report else []),
+    ]
+    return rich.console.Group(table, rich.text.Text("\n".join(below)))

@@ -1,0 +1,228 @@
+"""The rounds of a student with a mentor: clone, roll out, ask where it is in doubt, correct, clone again."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Annotated, Any, Protocol
+
+import numpy as np
+from annotated_types import Gt, Lt
+from numpy.typing import NDArray
+
+from lab.cloning.student import EPOCHS, Student
+from lab.errors import BadInput, check_value, unknown
+from lab.mentor.conformal import Promise
+from lab.mentor.doubts import DOUBTS, UNCALIBRATED
+from lab.mentor.mentor import Mentor
+from lab.recordings.episode import Episode, Recording
+
+Action = NDArray[np.float32]
+Policy = Callable[[Any], Action]
+Asks = Callable[[Any, Action], bool]
+DEMONSTRATING, CALIBRATING, CORRECTING, EVALUATING = range(4)  # what seeds are drawn for: none serves for two
+
+
+class RollsOut(Protocol):
+    """One episode of a policy from the start of a seed; `asks` says before each step whether the teacher takes it over."""
+
+    def __call__(self, policy: Policy, seed: int, *, asks: Asks | None = None) -> Episode:
+        """The episode."""
+
+
+@dataclass(frozen=True)
+class CloningOptions:
+    """What a student is cloned from and how it may ask.
+
+    demonstrations: episodes of the teacher at the start. rounds: of asking. questions: takeovers in a round, at most.
+    takeover_steps: for which the teacher then acts. rule: of the mentor. false_alarms: in which share of the episodes that
+    would have succeeded it may ask. calibrated: rollouts without a teacher that set the threshold of a round. episodes: with a
+    teacher in a round, at most. every_steps: after so many steps the rule "clock" asks, and "random" on average. evaluated:
+    rollouts by which a student is measured, the same after each round. epochs: of each student's learning.
+    """
+
+    demonstrations: int = 15
+    rounds: int = 4
+    questions: int = 10
+    takeover_steps: int = 10
+    rule: str = "distance"
+    false_alarms: float = 0.2
+    calibrated: int = 20
+    episodes: int = 40
+    every_steps: int = 50
+    evaluated: int = 30
+    epochs: int = EPOCHS
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.rule not in DOUBTS:
+            raise unknown("rule", self.rule, tuple(DOUBTS), "clone")
+        check_value("false_alarms", self.false_alarms, Annotated[float, Gt(0), Lt(1)], "clone")
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A student after a round, measured in episodes that nothing else has used.
+
+    successes (e,): of the episodes without a teacher. questions, corrected_steps: so far. warned: of the failed episodes, those
+    in which the mentor would have asked, and false_alarms: of the others; lead_steps: from the first question to the end of
+    each failed episode that was warned of. promise: of the mentor's threshold; None if too few rollouts succeeded to promise it.
+    helped, judged: takeovers, by the mentor's judge; rejected: whether it asks no more.
+    """
+
+    round: int
+    successes: tuple[bool, ...]
+    questions: int
+    corrected_steps: int
+    warned: int
+    false_alarms: int
+    lead_steps: tuple[int, ...]
+    promise: Promise | None
+    helped: int
+    judged: int
+    rejected: bool
+
+    @property
+    def success(self) -> float:
+        """The share of the episodes that succeeded."""
+        return sum(self.successes) / len(self.successes)
+
+
+@dataclass
+class Cloning:
+    """The state of a cloning session after its last round: all that the next one goes on from."""
+
+    demonstrations: Recording
+    student: Student
+    mentor: Mentor
+    corrections: list[Episode] = field(default_factory=list)
+    measured: list[Measured] = field(default_factory=list)
+    questions: int = 0  # so far
+
+
+def seeds_for(options: CloningOptions, purpose: int, count: int, in_round: int = 0) -> list[int]:
+    """The seeds of the episodes for a purpose; those of different purposes and rounds are drawn apart."""
+    rng = np.random.default_rng([options.seed, purpose, in_round])
+    return [int(seed) for seed in rng.integers(2**32, size=count)]
+
+
+def cloned(
+    roll_out: RollsOut, demonstrations: Recording, options: CloningOptions, session: Cloning | None = None
+) -> Iterator[Cloning]:
+    """The session after each round, the first before any question; it goes on from a session that was interrupted."""
+    if session is None:
+        student = Student.learn(demonstrations, seed=options.seed, epochs=options.epochs)
+        session = Cloning(demonstrations, student, _mentor(roll_out, demonstrations, [], student, options, 0))
+        session.measured.append(_measure(roll_out, session, options))
+        yield session
+    while len(session.measured) <= options.rounds:
+        number = len(session.measured)
+        _correct(roll_out, session, options, number)
+        session.student = Student.learn(
+            demonstrations, session.corrections, seed=options.seed + number, epochs=options.epochs
+        )
+        judge = session.mentor.judge
+        session.mentor = _mentor(roll_out, demonstrations, session.corrections, session.student, options, number)
+        session.mentor.judge = judge
+        session.measured.append(_measure(roll_out, session, options))
+        yield session
+
+
+def _mentor(
+    roll_out: RollsOut,
+    demonstrations: Recording,
+    corrections: Sequence[Episode],
+    student: Student,
+    options: CloningOptions,
+    number: int,
+) -> Mentor:
+    """A mentor of the student's own data, calibrated by rollouts of this student without a teacher."""
+    recording = Recording(
+        demonstrations.fps,
+        demonstrations.robot,
+        demonstrations.state_names,
+        demonstrations.action_names,
+        [*demonstrations.episodes, *(_corrections_alone(episode) for episode in corrections)],
+    )
+    if options.rule in UNCALIBRATED:
+        return Mentor.learn(recording, options.rule, seed=options.seed)
+    seeds = seeds_for(options, CALIBRATING, options.calibrated, number)
+    rollouts = [student.planned(roll_out(student, seed)) for seed in seeds]
+    try:
+        mentor = Mentor.learn(recording, options.rule, rollouts=rollouts, seed=options.seed)
+    except BadInput:  # the failure predictor, when all rollouts or none failed
+        mentor = Mentor.learn(recording, "distance", seed=options.seed)
+    if options.rule in ("random", "clock"):
+        often = options.every_steps
+        mentor.threshold = 1.0 - 1.0 / often if options.rule == "random" else often - 1.5  # the clock counts from 0
+        return mentor
+    well = [episode for episode in rollouts if episode.success]
+    if (len(well) + 1) * options.false_alarms >= 1.0:
+        return mentor.calibrate(rollouts, false_alarms=options.false_alarms)
+    mentor.threshold = max(
+        (mentor.peak(episode) for episode in well), default=-np.inf
+    )  # a promise takes more successes
+    return mentor
+
+
+def _corrections_alone(episode: Episode) -> Episode:
+    """An episode of which only the corrected steps count as demonstrated, whether or not it succeeded."""
+    return episode.part(0, len(episode), success=False)
+
+
+def _correct(roll_out: RollsOut, session: Cloning, options: CloningOptions, number: int) -> None:
+    """Adds the episodes of a round in which the teacher took over; no more episodes once all questions are asked."""
+    left = options.questions if options.rule != "never" else 0
+    for seed in seeds_for(options, CORRECTING, options.episodes, number):
+        if left <= 0 or session.mentor.judge.rejects:
+            return
+        asks = Asking(session.mentor, session.student, left, options.takeover_steps)
+        episode = roll_out(session.student, seed, asks=asks)
+        left -= asks.questions
+        session.questions += asks.questions
+        if asks.questions:
+            session.corrections.append(episode)
+
+
+class Asking:
+    """The teacher takes over for some steps when the mentor asks, as long as questions are left."""
+
+    def __init__(self, mentor: Mentor, student: Student, questions_left: int, takeover_steps: int) -> None:
+        self.mentor, self.student = mentor, student
+        self.questions, self.questions_left, self.takeover_steps = 0, questions_left, takeover_steps
+        self._taken = 0  # steps that are left of the takeover
+        self._gave_last = False
+        mentor.begin()
+
+    def __call__(self, observation: Any, action: Action) -> bool:
+        asks = self.mentor(observation, action, chunk=self.student.plan(observation), corrected=self._gave_last)
+        if self._taken == 0 and asks and self.questions < self.questions_left:
+            self.questions += 1
+            self._taken = self.takeover_steps
+        self._gave_last = self._taken > 0
+        self._taken -= self._gave_last
+        return self._gave_last
+
+
+def _measure(roll_out: RollsOut, session: Cloning, options: CloningOptions) -> Measured:
+    """The student in the episodes that are kept for this, and what its mentor would have asked in them."""
+    mentor, judge = session.mentor, session.mentor.judge
+    seeds = seeds_for(options, EVALUATING, options.evaluated)
+    episodes = [session.student.planned(roll_out(session.student, seed)) for seed in seeds]
+    asked = [np.flatnonzero(mentor.doubts(episode) > mentor.threshold) for episode in episodes]
+    warned = [
+        len(episode) - int(steps[0])
+        for episode, steps in zip(episodes, asked, strict=True)
+        if len(steps) and not episode.success
+    ]
+    return Measured(
+        len(session.measured),
+        tuple(bool(episode.success) for episode in episodes),
+        session.questions,
+        int(sum(episode.corrected.sum() for episode in session.corrections)),
+        len(warned),
+        sum(bool(episode.success and len(steps)) for episode, steps in zip(episodes, asked, strict=True)),
+        tuple(warned),
+        mentor.promise,
+        judge.helped,
+        judge.judged,
+        judge.rejects,
+    )

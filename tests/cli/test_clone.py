@@ -1,0 +1,41 @@
+"""`lab clone`, with few short episodes."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+SHORT = ("--demonstrations", "1", "--evaluated", "1", "--epochs", "2", "--rule", "always", "--questions", "1")
+
+
+def test_it_clones_asks_and_goes_on(lab: Callable[..., Any], tmp_path: Path) -> None:
+    out = tmp_path / "grasp"
+    first = lab("clone", "grasp", *SHORT, "--rounds", "0", "--out", str(out), "--json").json
+    assert [one["questions"] for one in first["rounds"]] == [0]
+    after = lab("clone", "--resume", str(out), "--rounds", "1")
+    assert "1 question" in after.err
+    assert "LeRobot" in after.out
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ([], "--resume"),
+        (["grasp", "--rule", "distanc"], "did you mean 'distance'"),
+        (["grasp", "--false-alarms", "0"], "false_alarms"),
+        (["grap"], "grap"),
+        (["grasp", "--task", "toas"], "toas"),
+        (["--resume", "nothing"], "nothing"),
+        (["grasp", "--resume", "nothing"], "one of the two"),
+    ],
+)
+def test_bad_input_is_one_line(
+    lab: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], told: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    ran = lab("clone", *words, *(["--out", "new"] if "--resume" not in words else []))
+    assert ran.code == 2
+    assert told in ran.err
+    assert len(ran.err.strip().splitlines()) == 1
+    assert not [*tmp_path.iterdir()]

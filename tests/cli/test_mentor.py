@@ -1,0 +1,78 @@
+"""`lab mentor`, on recordings of a cart."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lab.mentor.mentor import Mentor
+from lab.recordings.episode import Episode, Recording
+from lab.recordings.lerobot_write import write
+
+
+def cart(places: list[float], corrected: tuple[int, ...] = ()) -> Episode:
+    states = np.array(places, np.float32)[:, None]
+    return Episode("go", states, states, np.isin(np.arange(len(places)), corrected), True)
+
+
+@pytest.fixture(scope="module")
+def datasets(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """With takeovers, demonstrations, and rollouts."""
+    folder = tmp_path_factory.mktemp("datasets")
+    straight, strayed = [0.1 * step for step in range(11)], [0.0, 0.1, 0.2, 5.0, 5.1, 0.3]
+    episodes = {
+        "taken": [cart(straight) for _ in range(12)] + [cart(strayed, (5,)) for _ in range(3)],
+        "shown": [cart(straight) for _ in range(4)],
+        "alone": [cart([place + 0.01 * number for place in straight]) for number in range(9)],
+    }
+    for name, held in episodes.items():
+        write(Recording(1, "cart", ("x",), ("dx",), held), folder / name)
+    return {name: folder / name for name in episodes}
+
+
+def test_it_compares_the_rules(lab: Any, datasets: dict[str, Path], tmp_path: Path) -> None:
+    page = tmp_path / "report.html"
+    document = lab("mentor", str(datasets["taken"]), "--window", "2", "--report", str(page), "--json").json
+    assert document["takeovers"] == 3
+    assert {row["rule"]: row["recall"] for row in document["rules"]}["distance"] == 1.0
+    assert "distance" in page.read_text(encoding="utf-8")
+    assert "distance" in lab("mentor", str(datasets["taken"]), "--window", "2").out
+
+
+def test_it_keeps_a_mentor_with_its_promise(lab: Any, datasets: dict[str, Path], tmp_path: Path) -> None:
+    kept = tmp_path / "mentor.safetensors"
+    words = [
+        "mentor",
+        *map(str, (datasets["shown"], "--rollouts", datasets["alone"], "--keep", kept, "--false-alarms", 0.2)),
+    ]
+    document = lab(*words, "--json").json
+    assert (document["successes"], document["expected"]) == (9, 0.2)
+    mentor = Mentor.load(kept)
+    assert mentor.threshold == document["threshold"]
+    assert mentor([9.0], [0.0])
+    assert "20" in lab(*words).out
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["nothing"], "nothing"),
+        (["{shown}"], "takeovers"),
+        (["{taken}", "--keep", "x"], "--rollouts"),
+        (["{taken}", "--report", "no/such/folder.html"], "--report"),
+        (["{taken}", "--false-alarms", "0.01"], "0.01"),
+        (["{shown}", "--rollouts", "{alone}", "--keep", "m", "--rule", "distanc"], "did you mean 'distance'"),
+        (["{shown}", "--rollouts", "{taken}", "--keep", "m", "--rule", "failure"], "failure"),
+        (["{shown}", "--rollouts", "{alone}", "--keep", "m", "--report", "r.html"], "--report"),
+    ],
+)
+def test_bad_input_is_one_line(
+    lab: Any, datasets: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], told: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    ran = lab("mentor", *(word.format(**datasets) for word in words))
+    assert ran.code == 2
+    assert told in ran.err
+    assert len(ran.err.strip().splitlines()) == 1
+    assert not [*tmp_path.iterdir()]
