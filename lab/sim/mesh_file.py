@@ -1,5 +1,6 @@
 """Mesh files, OBJ or STL: their vertices, read without a heavy library, and their bytes for a library that reads UTF-8 only."""
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,27 @@ def vertices(path: Path) -> Array:
     word = "vertex" if path.suffix.lower() == ".stl" else "v"
     lines = (line.split() for line in _text(data).splitlines())
     return np.array([parts[1:4] for parts in lines if parts[:1] == [word]], dtype=float)
+
+
+def triangles(path: Path) -> Array:
+    """The triangles (n, 3, 3) of an OBJ or STL file, in its own unit. ValueError when they cannot be read as numbers.
+
+    A face of an OBJ file with more corners is taken as a fan.
+    """
+    corners = vertices(path)
+    if path.suffix.lower() == ".stl":
+        return corners.reshape(-1, 3, 3)
+    fans = []
+    for line in _text(read_limited(path, MAX_BYTES)).splitlines():
+        words = line.split()
+        if words[:1] == ["f"]:
+            at = [int(word.partition("/")[0]) for word in words[1:]]
+            at = [number - 1 if number > 0 else len(corners) + number for number in at]
+            fans += [(at[0], one, other) for one, other in pairwise(at[1:])]
+    chosen = np.array(fans, int).reshape(-1, 3)
+    if chosen.size and (chosen.min() < 0 or chosen.max() >= len(corners)):
+        raise ValueError("a face names a corner that is not there")
+    return np.asarray(corners[chosen])
 
 
 def text_corners(path: Path | None) -> Array | None:

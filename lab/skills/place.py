@@ -78,7 +78,9 @@ def release_pose(bench: Bench, body: str, spot: Spot) -> ToolPose:
     hangs = bench.part_pose(body, tool.yaw)
     c, s = np.cos(tool.yaw), np.sin(tool.yaw)
     along = c * (hangs.x - tool.x) + s * (hangs.y - tool.y)
-    return wanted.local(-along, 0.0, tool.z - hangs.z + RELEASE_ABOVE)
+    one_jaw = bench.scene.robot.arm.gripper.one_jaw  # it has pushed the part aside; two fingers hold it in the middle
+    across = c * (hangs.y - tool.y) - s * (hangs.x - tool.x) if one_jaw else 0.0
+    return wanted.local(-along, -across, tool.z - hangs.z + RELEASE_ABOVE)
 
 
 def let_go(bench: Bench, exit_path: Sequence[ToolPose]) -> Iterator[None]:

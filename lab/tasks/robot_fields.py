@@ -17,15 +17,17 @@ class RobotSettings(Record):
     """The arm, its mounting, its start, its speed and its forces."""
 
     model: str = "up6"
-    """The arm: `up6`, `panda`, `iiwa` or `xarm6`, or the URDF file of another one beside the task file, such as
-    `"my-arm.urdf"`.
+    """The arm: `up6`, `panda`, `iiwa` or `xarm6`, or the URDF file of another one: beside the task file, such as
+    `"my-arm.urdf"`, or in an installed Python package, as `"package://NAME/arm.urdf"`.
     """
     tool_link: Part | None = None
-    """In a URDF: the link whose z axis points out of the gripper and along whose y axis the fingers close, such as
-    `"hand"`.
+    """In a URDF: the link whose z axis points out of the gripper and along whose y axis two fingers close (one jaw:
+    across z), such as `"hand"`.
     """
     fingers: Annotated[tuple[Part, ...], BeforeValidator(as_tuple), Field(min_length=1, max_length=8)] | None = None
-    """In a URDF: the joints that move the fingers, such as `["left_finger", "right_finger"]`."""
+    """In a URDF: the joints that move the fingers, such as `["left_finger", "right_finger"]`, or the one joint of a jaw
+    that closes on the hand.
+    """
     tip_m: Annotated[float, Field(ge=0, le=1)] | None = None
     """In a URDF: the distance of the finger tips along the tool link's z axis [m], such as `0.1`."""
     nearest_m: Annotated[float, Field(ge=0.05, le=5)] | None = None
@@ -50,6 +52,10 @@ class RobotSettings(Record):
     """The largest force of each finger [N], such as `25.0`; a part that would creep is held with less. Left out: chosen
     for each kind of part from its mass, size and friction.
     """
+    joint_speed_rad_s: Annotated[float, Field(gt=0, le=100)] | None = None
+    """The largest speed of each joint [rad/s], such as `4.7`; left out: the arm's own limits."""
+    joint_torque_nm: Annotated[float, Field(gt=0, le=5000)] | None = None
+    """The largest torque of the motor of each joint [Nm], such as `2.9`; left out: as strong as the load takes."""
     force_limit_n: Annotated[float, Field(ge=10, le=5000)] | None = None
     """The contact force of the arm at which a protective stop holds it [N], such as `150.0`; left out: 150, or six times
     the grip force if that is more.

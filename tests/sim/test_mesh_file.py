@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lab.sim.mesh_file import readable, vertices
+from lab.sim.mesh_file import readable, triangles, vertices
 
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.5]])
 
@@ -34,3 +34,15 @@ def test_a_text_in_latin_1_is_read_and_handed_on_in_utf_8(tmp_path: Path) -> Non
     (tmp_path / "a.obj").write_bytes(text.encode("latin-1"))
     assert vertices(tmp_path / "a.obj") == pytest.approx(CORNERS)
     assert readable(tmp_path / "a.obj").decode("utf-8") == text
+
+
+def test_triangles_of_a_square_and_of_a_solid(tmp_path: Path) -> None:
+    """An OBJ's faces count their corners from 1, or backwards from the last one; a square is two triangles."""
+    (tmp_path / "square.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1/1/1 2 3 4\nf -4 -3 -2\n")
+    found = triangles(tmp_path / "square.obj")
+    assert found.shape == (3, 3, 3)
+    assert found[1].tolist() == [[0, 0, 0], [1, 1, 0], [0, 1, 0]]
+    assert found[2].tolist() == [[0, 0, 0], [1, 0, 0], [1, 1, 0]]
+    (tmp_path / "less.obj").write_text("v 0 0 0\nf 1 2 3\n")
+    with pytest.raises(ValueError, match="a face names a corner that is not there"):
+        triangles(tmp_path / "less.obj")

@@ -27,7 +27,9 @@ SHIPPED = sorted(tasks_folder().glob("*.toml"))
 SMALL = [path for path in SHIPPED if path.stat().st_size < 20_000]
 OF_SEVERAL = {"value_error", "assertion_error"}  # what one key demands of another, which a schema does not say
 BARE = {"LearnerSettings", "GateSettings", "Rewards"}  # whose numbers have no units
-UNITS = {"_s": "s", "_m": "m", "_kg": "kg", "_n": "N", "_rad": "rad", "_m_s": "m/s", "_m_s2": "m/s2"}
+UNITS = {
+    "_s": "s", "_m": "m", "_kg": "kg", "_n": "N", "_nm": "Nm", "_rad": "rad", "_m_s": "m/s", "_rad_s": "rad/s", "_m_s2": "m/s2",
+}  # fmt: skip
 
 
 @cache

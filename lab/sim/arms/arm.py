@@ -29,8 +29,12 @@ class Kinematics(Protocol):
     def spins(self) -> tuple[float, float]:
         """The signs, 1 or -1, of the tool's turn with the first and with the last joint, seen from above."""
 
+    @property
+    def aside(self) -> Array:
+        """Where the tool is beside the last joint's axis (2,) [m], along the tool's y and z axes."""
+
     def bent(self, out: Array, up: Array) -> Array:
-        """The joints (n, k) for a tool `out` (n,) [m] off the first axis, `up` (n,) [m], at yaw 0; NaN: unsolvable."""
+        """The joints (n, k) for a last axis `out` (n,) [m] off the first, tips `up` (n,) [m], at yaw 0; NaN: unsolvable."""
 
     def tools(self, joints: Array) -> Array:
         """The tool poses x, y, z [m], yaw [rad] (n, 4) that joints (n, k) hold."""
@@ -43,6 +47,7 @@ class Arm:
     urdf: the checked URDF that physics loads; joints (k,) from the foot to the tool, their ranges lower, upper (k,) [rad] and
     speed (k,) [rad/s]; tool_link, tip (4, 4): the finger tips' frame in it, x out of the gripper, y across; nearest_m: the least
     distance of the tool from the first axis, so that it clears the arm. level: the level tool's kinematics; None: it hangs.
+    torque_nm: the largest torque of a joint's motor [Nm]; None: it has no limit.
     """
 
     name: str
@@ -58,6 +63,7 @@ class Arm:
     base_up_m: float
     kinematics: Kinematics
     level: LevelTool | None = None
+    torque_nm: float | None = None
 
     @property
     def gripper(self) -> Gripper:
@@ -88,36 +94,69 @@ class Arm:
 
     def inverse_each(self, poses: Array) -> Array:
         """The joints (n, k) of `inverse` for each of many poses x, y, z [m], yaw [rad] (n, 4); NaN without a solution."""
-        joints = self._bent(poses)
-        last, low, high = joints[:, -1].copy(), self.lower[-1], self.upper[-1]
-        best = np.full(len(joints), np.nan)
+        both = self._both_ways(poses)
+        best = np.full_like(both[0], np.nan)
         for half in sorted(_WAYS_ROUND, key=lambda half: (half % 2, abs(half))):
-            turned = last + half * pi
-            best = np.where(np.isnan(best) & (turned >= low) & (turned <= high), turned, best)
-        joints[:, -1] = best
-        joints[np.isnan(best)] = np.nan
-        return joints
+            turned = both[half % 2][:, -1] + half * pi
+            chosen = np.isnan(best[:, -1]) & (turned >= self.lower[-1]) & (turned <= self.upper[-1])
+            best[chosen] = both[half % 2][chosen]
+            best[chosen, -1] = turned[chosen]
+        return best
 
     def inverse_path(self, poses: Array, before: Array | None = None) -> Array:
         """The joints (n, k) along a path of poses (n, 4), on which the tool turns without jumps; NaN without a solution.
 
         before (k,): the joints before the path; the tool continues its turn from there if it can. If the last joint cannot turn
-        through the whole path, the tool is turned by half a turn along all of it.
+        through the whole path, the tool is turned by half a turn along all of it; one beside the last joint's axis stays turned.
+        """
+        both = self._both_ways(poses)
+        reached = [~np.isnan(joints[:, 0]) for joints in both]
+        turns = [np.unwrap(joints[known, -1]) for joints, known in zip(both, reached, strict=True)]
+        halves = [half for half in _WAYS_ROUND if turns[half % 2].size]
+        if not halves:
+            return both[0]
+        begun = turns[halves[0] % 2][0] if before is None else float(before[-1])
+        stays = before is not None and self.kinematics.aside.any()  # half a turn would move its other joints, too
+
+        def preferred(half: int) -> tuple[float, float, int]:
+            far = round(abs(turns[half % 2][0] + half * pi - begun), 9)
+            return (far, half % 2, half) if stays else (half % 2, far, half)
+
+        for half in sorted(halves, key=preferred):
+            turned = turns[half % 2] + half * pi
+            if turned.min() >= self.lower[-1] and turned.max() <= self.upper[-1]:
+                joints = both[half % 2].copy()
+                joints[reached[half % 2], -1] = turned
+                return joints
+        return np.full_like(both[0], np.nan)
+
+    def spun(self, joints: Array, turns: Array) -> Array:
+        """The joints (n, k) that turn the tool on the spot from positions `joints` (k,), its last one by `turns` (n,) [rad].
+
+        The last joint moves a little more or less if the tool is beside its axis. NaN where the other joints cannot follow.
+        """
+        if not self.kinematics.aside.any():
+            rows = np.repeat(joints[None], len(turns), axis=0)
+            rows[:, -1] += turns
+            return rows
+        pose = self.forward(joints)
+        poses = np.array([[pose.x, pose.y, pose.z, pose.yaw]]) + np.outer(turns, [0, 0, 0, self.kinematics.spins[1]])
+        rows = self._bent(poses)
+        near = joints[-1] + turns
+        rows[:, -1] = near + (rows[:, -1] - near + pi) % (2 * pi) - pi
+        return rows
+
+    def _both_ways(self, poses: Array) -> tuple[Array, Array]:
+        """The results of `_bent` for the tool as asked for, and turned by half a turn, which is taken off the last joint again.
+
+        They are equal, one array, if the tool is on the last joint's axis.
         """
         joints = self._bent(poses)
-        reached = ~np.isnan(joints[:, 0])
-        if not reached.any():
-            return joints
-        turns = np.unwrap(joints[reached, -1])
-        begun = turns[0] if before is None else float(before[-1])
-        ways = sorted(_WAYS_ROUND, key=lambda half: (half % 2, round(abs(turns[0] + half * pi - begun), 9), half))
-        for half in ways:
-            turned = turns + half * pi
-            if turned.min() >= self.lower[-1] and turned.max() <= self.upper[-1]:
-                joints[reached, -1] = turned
-                return joints
-        joints[:] = np.nan
-        return joints
+        if not self.kinematics.aside.any():
+            return joints, joints
+        turned = self._bent(poses + np.array([0.0, 0.0, 0.0, pi]))
+        turned[:, -1] -= pi
+        return joints, turned
 
     def forward(self, joints: Array) -> ToolPose:
         """The tool pose at joint positions (k,), which `inverse` returned or that are close to such."""
@@ -146,8 +185,13 @@ class Arm:
             poses = np.where(np.abs(poses).max(axis=1, keepdims=True) < 1e3, poses, np.nan)
             asked, poses = poses, poses if self.level is None else self.level.hanging(poses)
             first, last = self.kinematics.spins
-            turn = np.arctan2(poses[:, 1], poses[:, 0])
-            joints = self.kinematics.bent(np.hypot(poses[:, 0], poses[:, 1]), poses[:, 2] - self.base_up_m)
+            (across, ahead), c, s = self.kinematics.aside, np.cos(poses[:, 3]), np.sin(poses[:, 3])
+            x, y = (
+                poses[:, 0] - (c * ahead - s * across),
+                poses[:, 1] - (s * ahead + c * across),
+            )  # of the last joint's axis
+            turn = np.arctan2(y, x)
+            joints = self.kinematics.bent(np.hypot(x, y), poses[:, 2] - self.base_up_m)
             joints[:, 0] += first * turn
             joints[:, -1] = (joints[:, -1] + last * (poses[:, 3] - turn) + pi) % (2 * pi) - pi
             if self.level is not None:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
+from importlib.util import find_spec
 from math import pi
 from pathlib import Path
 from typing import Literal
@@ -16,10 +17,13 @@ from lab.sim import models
 from lab.sim.arms import kinematics
 from lab.sim.arms.arm import Arm, Kinematics
 from lab.sim.arms.chain import Chain
-from lab.sim.arms.fingers import fingers_of
-from lab.sim.arms.foreign_urdf import Urdf, settled, written
+from lab.sim.arms.convex_pieces import lighten
+from lab.sim.arms.fingers import fingers_of, is_jaw
+from lab.sim.arms.foreign_urdf import Urdf, parent, settled, written
 from lab.sim.arms.level_tool import LevelTool
-from lab.sim.arms.numeric_kinematics import NumericKinematics
+from lab.sim.arms.numeric_kinematics import ON_AXIS_M, NumericKinematics
+from lab.sim.arms.one_jaw import jaw_of
+from lab.sim.urdf_reader import floats
 from lab.tasks.robot_fields import RobotSettings
 
 Array = NDArray[np.float64]
@@ -29,6 +33,7 @@ ALONG_Z = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])  # the 
 FARTHEST_TURN = (
     pi - 0.15
 )  # [rad] limit of the first joint: beyond it, neighbouring poses behind the arm would differ by a whole turn
+PACKAGE = "package://"  # begins the name of a URDF in an installed Python package
 OWN_NEAREST_M = 0.25  # [m] `nearest_m` of a URDF whose task file does not set it
 
 
@@ -72,16 +77,33 @@ def arm_of(settings: RobotSettings, folder: Path = Path()) -> Arm:
     changed = 0
     path = Path()
     if settings.is_file:
-        urdf_path = within(folder, settings.model)
-        if urdf_path is None:
-            raise BadInput(f"robot.model '{settings.model}': the URDF lies outside the task file's folder")
-        path = urdf_path
-        if not is_file(path):
-            raise BadInput(f"robot.model '{settings.model}': no such file beside the task file")
+        path = _urdf_file(settings.model, folder)
         changed = path.stat().st_mtime_ns
     mount = (settings.opening_m, settings.base_up_m, settings.nearest_m)
     tool = settings.tool_link or "", settings.fingers or (), settings.tip_m
-    return _made(settings.model, path, changed, tool, mount, settings.tool == "level")
+    motors = settings.joint_speed_rad_s, settings.joint_torque_nm
+    return _made(settings.model, path, changed, tool, mount, motors, settings.tool == "level")
+
+
+def _urdf_file(name: str, folder: Path) -> Path:
+    """The file of a URDF beside the task file, or in an installed Python package; BadInput if there is none."""
+    where, file, place = "task file's", name, "beside the task file"
+    if name.startswith(PACKAGE):
+        package, _, file = name.removeprefix(PACKAGE).partition("/")
+        try:
+            spec = find_spec(package) if package.isidentifier() else None  # none of its code runs
+        except (ImportError, AttributeError, ValueError):
+            spec = None
+        folders = list(spec.submodule_search_locations or []) if spec else []
+        if not folders:
+            raise BadInput(f"robot.model '{name}': no Python package '{package}' is installed beside the lab")
+        where, folder, place = "package's", Path(folders[0]), f"in '{folders[0]}'"
+    path = within(folder, file)
+    if path is None:
+        raise BadInput(f"robot.model '{name}': the URDF lies outside the {where} folder")
+    if not is_file(path):
+        raise BadInput(f"robot.model '{name}': no such file {place}")
+    return path
 
 
 def arm_named(name: str, tool: Literal["hanging", "level"] = "hanging") -> Arm:
@@ -96,6 +118,7 @@ def _made(
     changed_ns: int,
     tool: tuple[str, tuple[str, ...], float | None],
     mount: tuple[float | None, float, float | None],
+    motors: tuple[float | None, float | None],
     level: bool,
 ) -> Arm:
     if name in ARMS:
@@ -111,10 +134,17 @@ def _made(
     tip[:3, :3], tip[:3, 3] = model.axes, model.axes[:, 0] * model.tip_m
     if model.flange is not None:
         urdf = _with_own_gripper(urdf, *model.flange)
-    elif not model.closed_form:
-        urdf.link(model.tool_link, "robot.tool_link")
+    urdf.link(model.tool_link, "robot.tool_link")
+    opening_m = opening_m or model.opening_m
+    if is_jaw(urdf, model.fingers):
+        fingers_found, tip = jaw_of(urdf, model.fingers[0], model.tool_link, tip, opening_m)
+    else:
+        fingers_found = fingers_of(urdf, model.fingers, model.tool_link, tip, opening_m)
+    if model.flange is None and not model.closed_form:
         urdf = _with_marker(urdf, model.tool_link, tip)
-    fingers_found = fingers_of(urdf, model.fingers, model.tool_link, tip, opening_m or model.opening_m)
+    if name not in ARMS:
+        lighten(urdf)
+        _centre(urdf, Chain.of(urdf, model.tool_link))
     chain = Chain.of(urdf, model.tool_link, tip)
     _still(urdf, (*chain.names, *fingers_found.joints))
     how: Kinematics = kinematics.ClosedForm() if model.closed_form else NumericKinematics(chain, name)
@@ -122,13 +152,15 @@ def _made(
     ahead = how.home[0]
     lower[0], upper[0] = max(lower[0], ahead - FARTHEST_TURN), min(upper[0], ahead + FARTHEST_TURN)
     file = path if model.closed_form else written(urdf.root, path.stem)
+    speed_rad_s, torque_nm = motors
+    speed = chain.speed if speed_rad_s is None else np.minimum(chain.speed, speed_rad_s)
     return Arm(
         name,
         file,
         chain.names,
         lower,
         upper,
-        chain.speed,
+        speed,
         fingers_found,
         model.tool_link,
         tip,
@@ -136,6 +168,7 @@ def _made(
         base_up_m,
         how,
         LevelTool.of(chain, how.home) if level else None,
+        torque_nm,
     )
 
 
@@ -144,6 +177,21 @@ def _still(urdf: Urdf, moving: tuple[str, ...]) -> None:
     for name, joint in urdf.joints.items():
         if name not in moving:
             joint.set("type", "fixed")
+
+
+def _centre(urdf: Urdf, chain: Chain) -> None:
+    """Moves the foot's frame into the axis of the first joint, if that turns about the vertical beside it."""
+    _, _, origins, directions = chain.along(np.zeros((1, len(chain.names))))
+    aside = origins[0, :1, :2].ravel()
+    if not aside.size or np.linalg.norm(aside) <= ON_AXIS_M or abs(directions[0, 0, 2]) < 0.999:
+        return
+    pieces = [piece for piece in urdf.links[urdf.foot] if piece.tag in ("inertial", "visual", "collision")]
+    for piece in [*pieces, *(joint for joint in urdf.joints.values() if parent(joint) == urdf.foot)]:
+        origin = piece.find("origin")
+        if origin is None:
+            origin = Xml.SubElement(piece, "origin", xyz="0 0 0")
+        x, y, z = floats(origin, "xyz", "0 0 0")
+        origin.set("xyz", f"{x - aside[0]:.12g} {y - aside[1]:.12g} {z:.12g}")
 
 
 def _with_own_gripper(urdf: Urdf, flange: str, out_m: float) -> Urdf:

@@ -18,11 +18,12 @@ PAD_M = 0.011  # effective radius at which the friction of a finger's pad, of 3 
 
 @dataclass(frozen=True)
 class Gripper:
-    """Two parallel fingers, which close along the tool's y axis [m].
+    """Two fingers, which close along the tool's y axis [m].
 
     opening_m: the distance between the open pads. depth_m: from the finger tips up to the palm. width_m, thick_m: a
     finger's size across the closing direction and along it. level: the tool is held level, not hanging. hand_m: how far the
-    hand above the palm reaches from the tool's axis, across the closing direction and along it.
+    hand above the palm reaches from the tool's axis, across the closing direction and along it. one_jaw: only one of the
+    fingers moves, and pushes the part against the other; with a jaw that swings, they are parallel at one opening alone.
     """
 
     opening_m: float
@@ -31,6 +32,7 @@ class Gripper:
     thick_m: float
     level: bool = False
     hand_m: tuple[float, float] = (0.0, 0.0)
+    one_jaw: bool = False
 
 
 # ---- The joints of the fingers, and their measurement -----------------------------------------------------------------
@@ -81,7 +83,7 @@ class Fingers:
     def forces(self, force: float, opening: float) -> list[float]:
         """The forces or torques of the driven joints [N or Nm] with which each finger presses with `force` [N]."""
         near = np.clip([opening - 0.002, opening + 0.002], self.openings[0], self.openings[-1])
-        way = float(near[1] - near[0])
+        way = 2.0 * float(near[1] - near[0]) / len(self.driven)  # one jaw alone moves by both fingers' way
         moved = np.abs(self.at(float(near[1])) - self.at(float(near[0])))
         chosen = [self.joints.index(joint) for joint in self.driven]
         return [force * way / max(float(moved[k]), 1e-9) for k in chosen]
@@ -92,13 +94,7 @@ def fingers_of(urdf: Urdf, named: tuple[str, ...], tool: str, tip: Array, openin
 
     opening_m: between the open pads; None: as wide as they open. BadInput if these joints do not open and close two fingers.
     """
-    leads = {name: name for name in named}
-    for name in named:
-        urdf.joint(name, "robot.fingers")
-    for name, joint in urdf.joints.items():
-        mimic = joint.find("mimic")
-        if mimic is not None and mimic.get("joint") in named and name not in leads:
-            leads[name] = mimic.get("joint", "")
+    leads = _leads(urdf, named)
     ends = _Ends(urdf, tuple(leads), tool, tip)
     gaps = np.array([ends.gap(share) for share in np.linspace(0.0, 1.0, _STROKES)])
     strokes = np.array([ends.positions(share) for share in np.linspace(0.0, 1.0, _STROKES)])
@@ -110,6 +106,23 @@ def fingers_of(urdf: Urdf, named: tuple[str, ...], tool: str, tip: Array, openin
     if opening_m is not None and not 0 < opening_m <= widest + 1e-9:
         raise BadInput(f"robot.opening_m {opening_m}: the gripper opens {widest:.3f} m at the most")
     return ends.fingers(leads, gaps, strokes, opening_m or widest)
+
+
+def is_jaw(urdf: Urdf, named: tuple[str, ...]) -> bool:
+    """Whether the joints `named` are a single one that no other joint mimics: one jaw, against the hand."""
+    return len(_leads(urdf, named)) == 1
+
+
+def _leads(urdf: Urdf, named: tuple[str, ...]) -> dict[str, str]:
+    """The finger joints, those that mimic one of `named` included, with the joint that each follows; BadInput if unknown."""
+    leads = {name: name for name in named}
+    for name in named:
+        urdf.joint(name, "robot.fingers")
+    for name, joint in urdf.joints.items():
+        mimic = joint.find("mimic")
+        if mimic is not None and mimic.get("joint") in named and name not in leads:
+            leads[name] = mimic.get("joint", "")
+    return leads
 
 
 class _Ends:

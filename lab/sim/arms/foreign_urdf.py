@@ -3,6 +3,7 @@
 Errors that physics could not handle are refused in one line; missing values are filled in.
 """
 
+import hashlib
 import os
 from collections.abc import Sequence
 from contextlib import suppress
@@ -15,6 +16,7 @@ from tempfile import TemporaryDirectory, gettempdir
 from xml.etree import ElementTree as Xml
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lab.errors import BadInput, unknown
 from lab.files import is_file, write_whole
@@ -24,12 +26,15 @@ from lab.sim.urdf_reader import check_inertial, check_joint, check_mesh, check_n
 
 MOVING = ("revolute", "prismatic")
 _FRAME_KG, _FRAME_KGM2 = 1e-3, 1e-7  # of a link that is only a frame: physics requires a positive mass of every link
+_NOTHING_KG = 1e-6  # a mass below it stands for none
 _ROOT_KG, _ROOT_KGM2 = 1.0, 0.01  # of a foot without an inertial: its mass has no effect, because it is bolted down
 MOST_LINKS = 200
 MOST_SEEN_BYTES = 500_000  # of the meshes of one link
 _GREY = "0.8 0.8 0.8 1"
 _QUARTER_RAD = 1e-5  # an angle this close to a quarter turn was rounded when it was written
 _PACKAGE = "package://"
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,18 +74,23 @@ class Urdf:
         way = []
         while link != self.foot:
             way.append(self.carrying[link])
-            link = _end(self.carrying[link], "parent")
+            link = parent(self.carrying[link])
         return way[::-1]
 
     def below(self, link: str) -> list[str]:
         """A link and all that it carries."""
-        carried = [name for name, joint in self.carrying.items() if _end(joint, "parent") == link]
+        carried = [name for name, joint in self.carrying.items() if parent(joint) == link]
         return [link, *(name for child_link in carried for name in self.below(child_link))]
 
 
 def child(joint: Xml.Element) -> str:
     """The link that a joint carries."""
     return _end(joint, "child")
+
+
+def parent(joint: Xml.Element) -> str:
+    """The link that a joint hangs on."""
+    return _end(joint, "parent")
 
 
 def _end(joint: Xml.Element, end: str) -> str:
@@ -158,7 +168,7 @@ def _tree(path: Path, root: Xml.Element, links: Sequence[str]) -> tuple[dict[str
 def _fill_inertial(path: Path, link: Xml.Element, is_foot: bool, joint: Xml.Element | None) -> None:
     """Gives frames and a massless foot a small mass, and replaces an impossible inertia by a close possible one."""
     name, mass = link.get("name", ""), link.find("inertial/mass")
-    weightless = mass is None or finite(path, f"mass of link '{name}'", mass.get("value")) == 0.0
+    weightless = mass is None or abs(finite(path, f"mass of link '{name}'", mass.get("value"))) < _NOTHING_KG
     is_frame = link.find("collision") is None and joint is not None and joint.get("type") == "fixed"
     if weightless and (is_frame or is_foot):
         old = link.find("inertial")
@@ -180,7 +190,7 @@ def _fill_inertial(path: Path, link: Xml.Element, is_foot: bool, joint: Xml.Elem
         _set_inertia(inertia, axes @ np.diag(moments) @ axes.T)
 
 
-def _set_inertia(element: Xml.Element, tensor: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]") -> None:
+def _set_inertia(element: Xml.Element, tensor: Array) -> None:
     names = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
     element.attrib.update({name: f"{float(tensor[at]):.9g}" for name, at in names.items()})
 
@@ -240,11 +250,27 @@ def _paint(root: Xml.Element) -> None:
         Xml.SubElement(Xml.SubElement(visual, "material", name=f"paint {number}"), "color", rgba=rgba)
 
 
+def mesh_written(corners: Array, faces: NDArray[np.int_]) -> Path:
+    """The path of an OBJ file of corners (n, 3) [m] and triangles (m, 3), in the folder of `written`."""
+    points = "".join(f"v {x:.6f} {y:.6f} {z:.6f}\n" for x, y, z in corners.tolist())
+    text = points + "".join(f"f {i + 1} {j + 1} {k + 1}\n" for i, j, k in faces.tolist())
+    return _kept(text.encode(), "mesh", ".obj")
+
+
 def written(root: Xml.Element, name: str) -> Path:
-    """The path of the file that a settled URDF is written to, in a folder that is removed when this process ends."""
+    """The path of the file that a settled URDF is written to, in a folder that is removed when this process ends.
+
+    Different arms have different files, also when their own files have one name.
+    """
     Xml.indent(root)
-    path = Path(_folder().name) / f"{name}.urdf"
-    write_whole(path, Xml.tostring(root, encoding="unicode").encode())
+    return _kept(Xml.tostring(root, encoding="unicode").encode(), name, ".urdf")
+
+
+def _kept(content: bytes, name: str, suffix: str) -> Path:
+    """The path of a file with this content."""
+    path = Path(_folder().name) / f"{name}-{hashlib.sha256(content).hexdigest()[:20]}{suffix}"
+    if not path.exists():
+        write_whole(path, content)
     return path
 
 

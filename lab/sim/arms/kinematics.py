@@ -56,6 +56,7 @@ class ClosedForm:
 
     home: ClassVar[Array] = HOME
     spins: ClassVar[tuple[float, float]] = (1.0, -1.0)  # of the first and the last joint: how the tool turns with them
+    aside: ClassVar[Array] = np.zeros(2)  # the tool is on the last joint's axis
 
     def bent(self, out: Array, up: Array) -> Array:
         """The joints (n, 6) for a tool `out` (n,) [m] off the S axis, `up` (n,) [m], at yaw 0, elbow up; NaN: unsolvable."""

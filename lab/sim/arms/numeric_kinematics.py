@@ -2,10 +2,12 @@
 
 The joints between these two depend on two numbers, how far out and how high the tool is. A table over both is made once, each
 entry from its neighbours, so that all of it belongs to one branch of solutions; a pose starts from its table entry. So the joints
-are a function of the pose alone, and neighbouring poses have neighbouring joints.
+are a function of the pose alone, and neighbouring poses have neighbouring joints. A tool may be beside the last joint's axis, as
+the middle between one jaw and a fixed one is: the table is then that of the axis, and `aside` says where the tool is.
 Source: damped least squares, Y. Nakamura and H. Hanafusa, 1986; a redundant arm stays near one posture, A. Liegeois, 1977.
 """
 
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -14,13 +16,15 @@ from numpy.typing import NDArray
 from lab.errors import BadInput
 from lab.sim.arms.chain import Chain
 
-STEP_M = 0.02  # spacing of the table's entries
+STEP_M = 0.02  # spacing of the table's entries, of a small arm less: STEPS_OUT entries are within its longest reach
+STEPS_OUT = 40
 WITHIN_M, WITHIN_RAD = 5e-4, 0.0087  # largest error of a solution: 0.5 mm, 0.5 degrees
 _EXACT = 1e-9  # [m], [rad] error at which Newton's method ends
 _JUMP = 0.35  # [rad or m] between two table entries: beyond it, the arm has changed its branch of solutions
 _DAMPING = 1e-5
 _SEEDS, _TRIES = 160, 60
 _UPRIGHT = 1e-6
+ON_AXIS_M = 1e-4  # distance of a tool from the last joint's axis up to which it counts as on it
 
 Array = NDArray[np.float64]
 DOWN = np.array(
@@ -32,10 +36,14 @@ class NumericKinematics:
     """The kinematics of one arm; chain: ends in the finger tips, x out of the gripper, y along which the fingers close."""
 
     def __init__(self, chain: Chain, name: str) -> None:
-        """BadInput unless the first joint turns about the vertical and the last about the tool's own axis."""
+        """BadInput unless the first joint turns about the vertical and the last about a line along the tool's own axis."""
         self.chain, self.name = chain, name
         self.count = len(chain.names)
         self.spins = self._spins()  # for the first and the last joint: 1 or -1, the sign of the tool's turn
+        self.aside = self._aside()
+        end = chain.end.copy()
+        end[:3, 3] -= end[:3, 1:3] @ self.aside
+        self._axis = replace(chain, end=end)  # it ends on the last joint's axis, beside the tool
         self._rest = (chain.lower + chain.upper) / 2  # a redundant arm stays near the middle of its ranges
 
     def _spins(self) -> tuple[float, float]:
@@ -47,11 +55,17 @@ class NumericKinematics:
         aside = np.hypot(*moved[0, :2, 0] - np.cross(first, chain.ends(np.zeros((1, self.count)))[0][0])[:2])
         if abs(abs(first[2]) - 1.0) > _UPRIGHT or aside > 1e-4:
             raise BadInput(f"arm '{self.name}': its first joint '{chain.names[0]}' does not turn it about the vertical")
-        if abs(abs(last[0]) - 1.0) > 1e-4 or np.linalg.norm(moved[0, :3, -1]) > 1e-4:
+        if abs(abs(last[0]) - 1.0) > 1e-4 or chain.slides[-1]:
             raise BadInput(
                 f"arm '{self.name}': its last joint '{chain.names[-1]}' does not turn the tool about the tool's own axis"
             )
         return float(np.sign(first[2])), -float(np.sign(last[0]))  # x points down: a turn about it decreases the yaw
+
+    def _aside(self) -> Array:
+        """Where the tool is beside the last joint's axis (2,) [m], along the tool's y and z axes; 0 if it is on it."""
+        at, axes, origins, _ = self.chain.along(np.zeros((1, self.count)))
+        off = (axes[0].T @ (at[0] - origins[0, -1]))[1:]
+        return off if np.linalg.norm(off) > ON_AXIS_M else np.zeros(2)
 
     @property
     def home(self) -> Array:
@@ -61,9 +75,9 @@ class NumericKinematics:
     # ---- Inverse and forward kinematics -------------------------------------------------------------------------
 
     def bent(self, out: Array, up: Array) -> Array:
-        """The joints (n, k) for a tool `out` (n,) [m] off the first joint's axis, `up` (n,) [m], at yaw 0; NaN: unsolvable."""
+        """The joints (n, k) for a last axis `out` (n,) [m] off the first, tips `up` (n,) [m], at yaw 0; NaN: unsolvable."""
         table, low = self._table
-        place = np.stack([out, up], axis=1) / STEP_M - low
+        place = np.stack([out, up], axis=1) / self._step - low
         inside = np.all((place >= 0.0) & (place <= np.array(table.shape[:2]) - 1.0), axis=1)
         corner = np.clip(np.nan_to_num(place).astype(int), 0, np.array(table.shape[:2]) - 2)
         share = np.clip(np.nan_to_num(place) - corner, 0.0, 1.0)
@@ -90,8 +104,8 @@ class NumericKinematics:
         return np.column_stack([at, np.arctan2(-axes[:, 0, 1], axes[:, 1, 1])])
 
     def misses(self, joints: Array, tools: Array) -> tuple[Array, Array]:
-        """The errors (n,) [m] and (n,) [rad], in tilt or in yaw, by which joint positions miss tool poses (n, 4)."""
-        at, axes = self.chain.ends(joints)
+        """The errors (n,) [m] and (n,) [rad], in tilt or in yaw, by which joints miss poses (n, 4) of the last axis."""
+        at, axes = self._axis.ends(joints)
         c, s = np.cos(tools[:, 3]), np.sin(tools[:, 3])
         wanted = np.zeros_like(axes)
         wanted[:, 2, 0] = -1.0
@@ -105,8 +119,8 @@ class NumericKinematics:
     def _table(self) -> tuple[Array, Array]:
         """Joint positions (i, j, k) by distance and height, NaN without a solution; and the indices (2,) of the first entry."""
         reach, foot = self._stretch
-        low = np.array([1.0, np.floor((foot - reach) / STEP_M)])
-        shape = (int(reach / STEP_M) + 1, int(2 * reach / STEP_M) + 2)
+        low = np.array([1.0, np.floor((foot - reach) / self._step)])
+        shape = (int(reach / self._step) + 1, int(2 * reach / self._step) + 2)
         table = np.full((*shape, self.count), np.nan)
         start, joints = self._begun
         table[tuple(start - low.astype(int))] = joints
@@ -121,7 +135,7 @@ class NumericKinematics:
             if not places:
                 break
             begun = np.array([np.mean(seeds[place], axis=0) for place in places])
-            out, up = ((np.array(places) + low) * STEP_M).T
+            out, up = ((np.array(places) + low) * self._step).T
             solved, _ = self._solved(begun, out, up, 20)
             fresh = [place for place, near in zip(places, self._near(solved, begun), strict=True) if near]
             for place, joints in zip(places, solved, strict=True):
@@ -137,6 +151,11 @@ class NumericKinematics:
         return float(links + slides), float(self.chain.roots[0, 2])
 
     @cached_property
+    def _step(self) -> float:
+        """The spacing of the table's entries [m]."""
+        return min(STEP_M, self._stretch[0] / STEPS_OUT)
+
+    @cached_property
     def _begun(self) -> tuple[NDArray[np.int_], Array]:
         """The indices of the table's first entry and its joint positions: of all solutions, the one whose joints are highest."""
         reach, foot = self._stretch
@@ -144,8 +163,8 @@ class NumericKinematics:
         seeds = rng.uniform(self.chain.lower, self.chain.upper, (_SEEDS, self.count))
         for share in (0.5, 0.4, 0.6, 0.3, 0.7):
             for high in (0.0, 0.2, -0.2, 0.4, -0.4):
-                place = np.array([round(share * reach / STEP_M), round((foot + high * reach) / STEP_M)])
-                out, up = (np.full(_SEEDS, number * STEP_M) for number in place)
+                place = np.array([round(share * reach / self._step), round((foot + high * reach) / self._step)])
+                out, up = (np.full(_SEEDS, number * self._step) for number in place)
                 solved, good = self._solved(seeds, out, up, _TRIES)
                 middles = self.chain.middles(solved)
                 good &= self._within(solved) & self._holds(solved, out, up) & (middles[:, 0] > 0.0)
@@ -178,7 +197,7 @@ class NumericKinematics:
         joints = joints.copy()
         going = np.arange(len(joints))
         for _ in range(tries):
-            at, axes, moved = self.chain.jacobian(joints[going])
+            at, axes, moved = self._axis.jacobian(joints[going])
             missed = np.concatenate(
                 [np.stack([out[going], 0 * going, up[going]], axis=1) - at, turn_to(axes, DOWN[None])], axis=1
             )

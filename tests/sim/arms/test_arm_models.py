@@ -122,11 +122,17 @@ def test_a_urdf_that_cannot_be_is_refused_in_one_line(tmp_path: Path, old: str, 
     [
         ({"tool_link": "tool1"}, "unknown link 'tool1' (robot.tool_link): did you mean 'tool0'"),
         ({"fingers": ("lift", "right")}, "unknown joint 'lift' (robot.fingers): did you mean 'left'"),
-        ({"fingers": ("left",)}, "do not open and close two fingers"),
-        ({"fingers": ("j2",)}, "do not open and close two fingers"),
+        ({"fingers": ("left", "j2")}, "do not open and close two fingers"),
+        (
+            {"fingers": ("left",)},
+            "the finger joint left opens and closes no jaw: no part of the hand comes within 0.02 m",
+        ),
+        ({"fingers": ("j2",)}, "the finger joint j2 opens and closes no jaw: it does not hang on the hand of 'tool0'"),
         ({"opening_m": 0.5}, "robot.opening_m 0.5: the gripper opens 0.060 m at the most"),
         ({"model": "other.urdf"}, "robot.model 'other.urdf': no such file beside the task file"),
         ({"model": "../own.urdf"}, "robot.model '../own.urdf': the URDF lies outside the task file's folder"),
+        ({"model": "package://no_such_arm/own.urdf"}, "no Python package 'no_such_arm' is installed beside the lab"),
+        ({"model": "package://../own.urdf"}, "no Python package '..' is installed beside the lab"),
         ({"tool_link": "l4"}, "its last joint 'j4' does not turn the tool about the tool's own axis"),
     ],
 )
@@ -134,6 +140,40 @@ def test_words_that_do_not_fit_the_urdf_are_refused(tmp_path: Path, settings: di
     with pytest.raises(BadInput) as caught:
         arm_of(RobotSettings(**(SETTINGS | settings)), written(tmp_path))
     assert said in str(caught.value)
+
+
+def test_an_arm_is_read_from_an_installed_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """None of the package's code runs, and nothing outside its folder is read."""
+    written(tmp_path)
+    package = tmp_path / "arm_of_mine"
+    (package / "urdf").mkdir(parents=True)
+    (package / "__init__.py").write_text("raise SystemExit")
+    written(package / "urdf")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    arm = arm_of(RobotSettings(**SETTINGS | {"model": "package://arm_of_mine/urdf/own.urdf"}))
+    assert arm.joints == ("j1", "j2", "j3", "j4", "j5")
+    for name, said in [("../own.urdf", "lies outside the package's folder"), ("own.urdf", "no such file in ")]:
+        with pytest.raises(BadInput, match=said):
+            arm_of(RobotSettings(**SETTINGS | {"model": f"package://arm_of_mine/{name}"}))
+
+
+def test_motors_are_as_fast_and_strong_as_the_task_says(tmp_path: Path) -> None:
+    arm = arm_of(RobotSettings(**SETTINGS, joint_speed_rad_s=1.5, joint_torque_nm=60.0), written(tmp_path))
+    assert arm.speed == pytest.approx([1.5] * 5)  # the URDF's own limit is 2
+    with World() as world:
+        robot = RobotArm(world, arm, 0.5, 2.0, 25.0)
+        pose = ToolPose(0.45, 0.0, 0.3)
+        robot.stand(pose)
+        for _ in robot.rest(60):
+            world.step()
+        assert robot.tool().z == pytest.approx(0.3, abs=1e-3)  # 7 links of 1 kg; below: what holds them takes more
+    weak = arm_of(RobotSettings(**SETTINGS, joint_torque_nm=3.0), tmp_path)
+    with World() as world:
+        robot = RobotArm(world, weak, 0.5, 2.0, 25.0)
+        robot.stand(pose)
+        for _ in robot.rest(60):
+            world.step()
+        assert robot.tool().z < 0.25
 
 
 def test_a_changed_file_is_another_arm(tmp_path: Path) -> None:
