@@ -1,5 +1,7 @@
 """`lab clone`: a student of demonstrations that asks where its mentor doubts."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -8,10 +10,12 @@ import typer
 
 from lab.cli import deferred
 from lab.cli.families import offers
-from lab.cli.options import Json, Seed
+from lab.cli.options import Json, Port, Seed
 from lab.cli.output import console, show
-from lab.errors import BadInput, counted
+from lab.errors import BadInput, counted, unknown
 from lab.lazy import rich
+
+TEACHERS = ("scripted", "terminal", "page")
 
 
 def clone(
@@ -41,6 +45,10 @@ def clone(
     evaluated: Annotated[
         int, typer.Option("--evaluated", min=1, max=100_000, help="Episodes by which each round's student is measured.")
     ] = 30,
+    teacher: Annotated[
+        str, typer.Option("--teacher", help="Who takes over: scripted, or you at the terminal or on a page.")
+    ] = "scripted",
+    port: Port = 0,
     epochs: Annotated[
         int, typer.Option("--epochs", min=1, max=100_000, help="Epochs of each student's learning.")
     ] = 400,
@@ -64,6 +72,8 @@ def clone(
     """
     if (skill is None) == (resume is None):
         raise BadInput("wanted a skill, or --resume DIR; one of the two")
+    if teacher not in TEACHERS:
+        raise unknown("teacher", teacher, TEACHERS, "--teacher")
     if plot is not None:
         deferred.check_picture(plot)
     if resume is not None:
@@ -89,9 +99,10 @@ def clone(
     folder = resume or out
     measured = list[Any]()
     try:
-        for session in deferred.rounds_of(kept, folder):
-            measured = session.measured
-            console().print(_line(measured[-1]), markup=False)
+        with _person(teacher, port, kept) as person:
+            for session in deferred.rounds_of(kept, folder, person):
+                measured = session.measured
+                console().print(_line(measured[-1]), markup=False)
     finally:
         kept.problem.close()
     if plot is not None:
@@ -107,6 +118,21 @@ def clone(
         "plot": None if plot is None else str(plot),
     }
     show(document, as_json, _summary)
+
+
+@contextmanager
+def _person(teacher: str, port: int, kept: Any) -> "Iterator[deferred.PersonRollouts | None]":
+    """Who takes over in place of the scripted teacher, as long as the block lasts; None for nobody."""
+    steps = kept.options.takeover_steps
+    if teacher == "page":
+        with deferred.TakeoverPage(port) as page:
+            console().print(f"page: {page.url}\nfrom another machine: {page.hint}", soft_wrap=True)
+            yield deferred.PersonRollouts(kept.problem, steps, page.ask, page.step)
+    elif teacher == "terminal":
+        read = deferred.default_reader(console(), moves=False)
+        yield deferred.PersonRollouts(kept.problem, steps, deferred.takeover_prompt(read, console()))
+    else:
+        yield None
 
 
 def _line(measured: Any) -> str:

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from lab.cloning.kept_cloning import check_new as check_new_cloning
     from lab.cloning.kept_cloning import options_of as cloning_options_of
     from lab.cloning.kept_cloning import rounds_of
+    from lab.cloning.person import PersonRollouts
     from lab.cloning.rounds import CloningOptions
     from lab.cloning.skill_problem import SkillProblem
     from lab.export import FORMATS, DatasetFormat
@@ -73,6 +74,7 @@ if TYPE_CHECKING:
     from lab.seat.language_model import language_models
     from lab.seat.lesson_seat import LessonSeat
     from lab.seat.page.finding_page import FindingPage
+    from lab.seat.page.takeover_page import TakeoverPage
     from lab.seat.page.teaching_page import SeatPage
     from lab.seat.run_progress import RunProgress
     from lab.seat.team import Team
@@ -84,6 +86,7 @@ if TYPE_CHECKING:
     from lab.seat.terminal.replay_keys import HELP as KEYS_HELP
     from lab.seat.terminal.replay_keys import replay_keys
     from lab.seat.terminal.subtask_questions import accepted_by
+    from lab.seat.terminal.takeover_prompt import takeover_prompt
     from lab.sequencing import SEQUENCERS
     from lab.sequencing.cell.objectives import OBJECTIVES
     from lab.sequencing.methods.srl_advised import FITTING
@@ -201,6 +204,7 @@ TABLE = {
         "options_of as cloning_options_of",
         "rounds_of",
     ),
+    "lab.cloning.person": ("PersonRollouts",),
     "lab.cloning.rounds": ("CloningOptions",),
     "lab.cloning.skill_problem": ("SkillProblem",),
     "lab.export": ("FORMATS", "DatasetFormat"),
@@ -238,6 +242,7 @@ TABLE = {
     "lab.seat.lesson_seat": ("LessonSeat",),
     "lab.seat.team": ("Team",),
     "lab.seat.page.finding_page": ("FindingPage",),
+    "lab.seat.page.takeover_page": ("TakeoverPage",),
     "lab.seat.page.teaching_page": ("SeatPage",),
     "lab.seat.run_progress": ("RunProgress",),
     "lab.seat.terminal.console_app": ("OperatorConsole",),
@@ -247,6 +252,7 @@ TABLE = {
     "lab.seat.terminal.prompt": ("TeachingPrompt",),
     "lab.seat.terminal.replay_keys": ("HELP as KEYS_HELP", "replay_keys"),
     "lab.seat.terminal.subtask_questions": ("accepted_by",),
+    "lab.seat.terminal.takeover_prompt": ("takeover_prompt",),
     "lab.recordings.lerobot_read": ("read as read_recording",),
     "lab.sequencing": ("SEQUENCERS",),
     "lab.sequencing.cell.objectives": ("OBJECTIVES",),

@@ -1,11 +1,14 @@
 """The folder of a cloning session: demonstrations, and a folder for each finished round, from which it goes on."""
 
 import json
+import re
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from shutil import rmtree
 
-from lab.cloning.rounds import Cloning, CloningOptions, Measured, cloned
+from lab.cloning.person import PersonRollouts
+from lab.cloning.rounds import Cloning, CloningOptions, Corrected, Hears, Measured, cloned
 from lab.cloning.skill_problem import SkillProblem
 from lab.cloning.student import Student
 from lab.errors import BadInput, WorkFailed
@@ -18,8 +21,9 @@ from lab.recordings.lerobot_write import write
 from lab.tasks.record import read_json
 
 SESSION, MEASURED = "session.json", "measured.json"
-DEMONSTRATIONS, CORRECTIONS = "demonstrations", "corrections"
+DEMONSTRATIONS, CORRECTIONS, BEGUN = "demonstrations", "corrections", "begun-"
 STUDENT, MENTOR = "student.safetensors", "mentor.safetensors"
+_EPISODE = re.compile(r"(\d{1,6})-(\d{1,6})")  # place and questions of an episode of a round that was interrupted
 _WANTED = "a session of `lab clone`"
 
 
@@ -45,27 +49,40 @@ def options_of(folder: Path) -> KeptOptions:
     return read_json(folder / SESSION, KeptOptions, f"session '{folder}' (--resume)", _WANTED)
 
 
-def rounds_of(kept: KeptOptions, folder: Path | None) -> Iterator[Cloning]:
+def rounds_of(kept: KeptOptions, folder: Path | None, person: PersonRollouts | None = None) -> Iterator[Cloning]:
     """The session after its last round in a folder, if that holds one, and after each further round, which is kept in the folder.
 
-    folder: None keeps nothing. Raises BadInput for a damaged folder, WorkFailed if it cannot be written.
+    folder: None keeps nothing; person: who takes over in place of the scripted teacher, and of whom each episode is kept at once.
+    Raises BadInput for a damaged folder, WorkFailed if it cannot be written.
     """
+    problem, options = kept.problem, kept.options
+    roll_out = problem if person is None else person
+    question = Hears().question if person is None else person.hear
     if folder is None:
-        yield from cloned(kept.problem, kept.problem.demonstrated(kept.options), kept.options)
+        yield from cloned(roll_out, problem.demonstrated(options), options, hears=Hears(question))
         return
     if not (folder / SESSION).exists():
         _write(folder / SESSION, json.dumps(asdict(kept), indent=1))
     if not (folder / DEMONSTRATIONS).is_dir():
-        write(kept.problem.demonstrated(kept.options), folder / DEMONSTRATIONS)
+        write(problem.demonstrated(options), folder / DEMONSTRATIONS)
     demonstrations = read(folder / DEMONSTRATIONS)
     session = loaded(folder, demonstrations)
     known = 0
     if session is not None:
         known = len(session.corrections)
         yield session
-    for after in cloned(kept.problem, demonstrations, kept.options, session):
-        _keep(folder, kept.problem, after, known)
-        known = len(after.corrections)
+
+    number = 0 if session is None else len(session.measured)
+
+    def keep_episode(corrected: Corrected) -> None:
+        if person is not None:
+            name = f"{corrected.place}-{corrected.questions}"
+            write(problem.recorded([corrected.episode]), folder / f"{BEGUN}{number}" / name)
+
+    for after in cloned(roll_out, demonstrations, options, session, hears=Hears(question, keep_episode)):
+        _keep(folder, problem, after, known)
+        rmtree(folder / f"{BEGUN}{number}", ignore_errors=True)
+        known, number = len(after.corrections), len(after.measured)
         yield after
 
 
@@ -81,7 +98,17 @@ def loaded(folder: Path, demonstrations: Recording) -> Cloning | None:
     last = _of_round(folder, len(measured) - 1)
     mentor = Mentor.load(last / MENTOR)
     mentor.judge = Judge(measured[-1].helped, measured[-1].judged, measured[-1].rejected)
-    return Cloning(demonstrations, Student.load(last / STUDENT), mentor, corrections, measured, measured[-1].questions)
+    student, begun = Student.load(last / STUDENT), _begun(folder / f"{BEGUN}{len(measured)}")
+    return Cloning(demonstrations, student, mentor, corrections, measured, measured[-1].questions, begun)
+
+
+def _begun(folder: Path) -> list[Corrected]:
+    """The kept episodes of a round that was interrupted, in their order."""
+    if not folder.is_dir():
+        return []
+    found = [_EPISODE.fullmatch(path.name) for path in folder.iterdir()]
+    kept = sorted((int(name[1]), int(name[2]), name[0]) for name in found if name)
+    return [Corrected(place, questions, read(folder / name).episodes[0]) for place, questions, name in kept]
 
 
 def _keep(folder: Path, problem: SkillProblem, session: Cloning, known: int) -> None:

@@ -12,7 +12,7 @@ from lab.cloning.student import EPOCHS, Student
 from lab.errors import BadInput, check_value, unknown
 from lab.mentor.conformal import Promise
 from lab.mentor.doubts import DOUBTS, UNCALIBRATED
-from lab.mentor.mentor import Mentor
+from lab.mentor.mentor import Mentor, Question
 from lab.recordings.episode import Episode, Recording
 
 Action = NDArray[np.float32]
@@ -86,9 +86,29 @@ class Measured:
         return sum(self.successes) / len(self.successes)
 
 
+@dataclass(frozen=True)
+class Corrected:
+    """An episode of a round in which somebody took over: its place among the round's seeds, and its questions."""
+
+    place: int
+    questions: int
+    episode: Episode
+
+
+@dataclass(frozen=True)
+class Hears:
+    """Who hears of a session: each question before the teacher takes over, and each episode with takeovers once it has ended."""
+
+    question: Callable[[Question], None] = lambda question: None
+    corrected: Callable[[Corrected], None] = lambda corrected: None
+
+
 @dataclass
 class Cloning:
-    """The state of a cloning session after its last round: all that the next one goes on from."""
+    """The state of a cloning session after its last round: all that the next one goes on from.
+
+    begun: episodes of the next round that was interrupted.
+    """
 
     demonstrations: Recording
     student: Student
@@ -96,6 +116,7 @@ class Cloning:
     corrections: list[Episode] = field(default_factory=list)
     measured: list[Measured] = field(default_factory=list)
     questions: int = 0  # so far
+    begun: list[Corrected] = field(default_factory=list)
 
 
 def seeds_for(options: CloningOptions, purpose: int, count: int, in_round: int = 0) -> list[int]:
@@ -110,6 +131,7 @@ def cloned(
     options: CloningOptions,
     session: Cloning | None = None,
     first: Student | None = None,
+    hears: Hears | None = None,
 ) -> Iterator[Cloning]:
     """The session after each round, the first before any question.
 
@@ -122,7 +144,7 @@ def cloned(
         yield session
     while len(session.measured) <= options.rounds:
         number = len(session.measured)
-        _correct(roll_out, session, options, number)
+        _correct(roll_out, session, options, number, hears or Hears())
         session.student = Student.learn(
             demonstrations, session.corrections, seed=options.seed + number, epochs=options.epochs
         )
@@ -175,25 +197,39 @@ def _corrections_alone(episode: Episode) -> Episode:
     return episode.part(0, len(episode), success=False)
 
 
-def _correct(roll_out: RollsOut, session: Cloning, options: CloningOptions, number: int) -> None:
+def _correct(roll_out: RollsOut, session: Cloning, options: CloningOptions, number: int, hears: Hears) -> None:
     """Adds the episodes of a round in which the teacher took over; no more episodes once all questions are asked."""
+    begun, session.begun = session.begun, []
     left = options.questions if options.rule != "never" else 0
-    for seed in seeds_for(options, CORRECTING, options.episodes, number):
+    for place, seed in enumerate(seeds_for(options, CORRECTING, options.episodes, number)):
         if left <= 0 or session.mentor.judge.rejects:
             return
-        asks = Asking(session.mentor, session.student, left, options.takeover_steps)
-        episode = roll_out(session.student, seed, asks=asks)
-        left -= asks.questions
-        session.questions += asks.questions
-        if asks.questions:
-            session.corrections.append(episode)
+        if begun and place <= begun[-1].place:  # before the interruption
+            corrected = next((one for one in begun if one.place == place), None)
+        else:
+            asks = Asking(session.mentor, session.student, left, options.takeover_steps, hears.question)
+            episode = roll_out(session.student, seed, asks=asks)
+            corrected = Corrected(place, asks.questions, episode) if asks.questions else None
+            if corrected is not None:
+                hears.corrected(corrected)
+        if corrected is not None:
+            left -= corrected.questions
+            session.questions += corrected.questions
+            session.corrections.append(corrected.episode)
 
 
 class Asking:
     """The teacher takes over for some steps when the mentor asks, as long as questions are left."""
 
-    def __init__(self, mentor: Mentor, student: Student, questions_left: int, takeover_steps: int) -> None:
-        self.mentor, self.student = mentor, student
+    def __init__(
+        self,
+        mentor: Mentor,
+        student: Student,
+        questions_left: int,
+        takeover_steps: int,
+        on_question: Callable[[Question], None] = lambda question: None,
+    ) -> None:
+        self.mentor, self.student, self.on_question = mentor, student, on_question
         self.questions, self.questions_left, self.takeover_steps = 0, questions_left, takeover_steps
         self._taken = 0  # steps that are left of the takeover
         self._gave_last = False
@@ -204,6 +240,7 @@ class Asking:
         if self._taken == 0 and asks and self.questions < self.questions_left:
             self.questions += 1
             self._taken = self.takeover_steps
+            self.on_question(asks)
         self._gave_last = self._taken > 0
         self._taken -= self._gave_last
         return self._gave_last
