@@ -119,6 +119,12 @@ STUDIES: dict[str, Study] = {
         sessions=20,
         least=2,
     ),
+    "promises": Study(
+        "Whether a mentor keeps its promises: false alarms and failures caught in held-out rollouts of clones",
+        _In("comparisons.promises", "promises"),
+        sessions=4,
+        least=2,
+    ),
     "mentor": Study(
         "A mentor for other people's policies: when they should ask, at equal questions",
         _In("comparisons.mentor", "mentor"),
