@@ -88,12 +88,12 @@ def rollout(cfg: AskingConfig):
         raise SystemExit(f"--mentor: {error}") from error
     signals = ProcessSignalHandler(use_threads=True, display_pid=False)
     ctx = build_rollout_context(cfg, signals.shutdown_event)
-    names = tuple(ctx.data.dataset_features["observation.state"]["names"]), tuple(ctx.data.ordered_action_keys)
-    if names != (mentor.state_names, mentor.action_names):
-        raise SystemExit(f"--mentor: it learned {mentor.state_names} and {mentor.action_names}, the robot has {names}")
     strategy = create_strategy(cfg.strategy)
-    ask_in(strategy, ctx, mentor, cfg.play_sounds)
+    names = tuple(ctx.data.dataset_features["observation.state"]["names"]), tuple(ctx.data.ordered_action_keys)
     try:
+        if names != (mentor.state_names, mentor.action_names):
+            raise SystemExit(f"--mentor: it learned {mentor.state_names}, {mentor.action_names}; the robot has {names}")
+        ask_in(strategy, ctx, mentor, cfg.play_sounds)
         strategy.setup(ctx)
         strategy.run(ctx)
     except KeyboardInterrupt:
