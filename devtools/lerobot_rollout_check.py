@@ -56,6 +56,7 @@ def rolled_out(python: Path, room: Path, options: list[str]) -> tuple[list[str],
     words += ["--dataset.repo_id=check/rollout_circle", "--task=stir"]
     words += ["--dataset.no_stamp=true", "--dataset.push_to_hub=false", f"--dataset.fps={FPS}", *options]
     child = pexpect.spawn(str(python), words, env=environment, cwd=str(room), encoding="utf-8", timeout=PATIENCE_S)
+    child.delayafterterminate = child.ptyproc.delayafterterminate = PATIENCE_S / 10
     asked, said = list[str](), list[str]()
     answers = {"autonomous -> paused": "\t", "paused -> correcting": "\t", "correcting -> paused": " "}
     try:
@@ -68,6 +69,7 @@ def rolled_out(python: Path, room: Path, options: list[str]) -> tuple[list[str],
             elif child.after.startswith("The mentor asks: "):
                 asked.append(child.after.removeprefix("The mentor asks: "))
         child.expect(pexpect.EOF)
+        child.wait()
     except (pexpect.TIMEOUT, pexpect.EOF) as error:
         raise SystemExit(f"LeRobot's side failed ({type(error).__name__}):\n{child.before}") from None
     finally:
@@ -96,7 +98,7 @@ def delays(episode: Episode) -> list[int | None]:
 
 def main(
     python: Annotated[Path, typer.Option(help="Python of an environment with LeRobot and the lab")],
-    sessions: Annotated[int, typer.Option(min=2, help="how many rollouts with pushes")] = 4,
+    sessions: Annotated[int, typer.Option(min=3, help="how many rollouts with pushes")] = 4,
     rule: Annotated[str, typer.Option(help="the mentor's measure of doubt")] = "distance",
     duration: Annotated[float, typer.Option(min=14, help="seconds a rollout")] = 18.0,
 ) -> None:
