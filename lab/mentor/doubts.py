@@ -125,14 +125,14 @@ class Ensemble(Measure):
     def __call__(self, step: Step) -> float:
         actions = step.members
         if actions is None:
-            each = zip(self.arrays["frequencies"], self.arrays["phases"], self.arrays["weights"], strict=True)
-            actions = np.array([_fourier(step.state, frequency, phase) @ weight for frequency, phase, weight in each])
+            seen = _fourier(step.state, self.arrays["frequencies"], self.arrays["phases"])
+            actions = (seen[:, None] @ self.arrays["weights"])[:, 0]
         return float(np.linalg.norm(actions.std(axis=0) / self.demonstrated.action_scale))
 
 
 def _fourier(states: Array, frequencies: Array, phases: Array) -> Array:
-    """Random Fourier features (..., f) of states (..., d)."""
-    return np.asarray(np.cos(states @ frequencies + phases) * np.sqrt(2.0 / len(phases)))
+    """Random Fourier features (n, f) of states (n, d), or (m, f) of one state (d,) by m members."""
+    return np.asarray(np.cos(states @ frequencies + phases) * np.sqrt(2.0 / phases.shape[-1]))
 
 
 class ChunkDisagreement(Measure):
