@@ -121,7 +121,7 @@ COMMANDS = {  # words after `lab` -> the command
     ),
     "export": Command(
         "export",
-        "Write what the robot did in a run as job files or trajectories, read them back and play them in physics.",
+        "Write what the robot did in a run as job files or trajectories, which are read back and played, or as a dataset.",
         "lab export toast-run --format jbi",
         more="{words of exporting}",
     ),
