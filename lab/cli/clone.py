@@ -1,62 +1,81 @@
 """`lab clone`: a student of demonstrations that asks where its mentor doubts."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
+from statistics import median
 from typing import Annotated, Any
 
 import typer
 
 from lab.cli import deferred
 from lab.cli.families import offers
-from lab.cli.options import Json, Port, Seed
+from lab.cli.options import Json, Port
 from lab.cli.output import console, show
 from lab.errors import BadInput, counted, unknown
 from lab.lazy import rich
 
 TEACHERS = ("scripted", "terminal", "page")
+UNPROMISED = ("always", "never", "random", "clock")  # rules whose thresholds no rollouts set
 
 
 def clone(
     skill: Annotated[
         str | None, typer.Argument(help="A skill of the task, or a sub-task: grasp, insert, place, transfer.")
     ] = None,
-    task: Annotated[str, typer.Option("--task", help="A task that ships, or a .toml file.")] = "toast",
+    task: Annotated[
+        str | None, typer.Option("--task", help="A task that ships, or a .toml file; default: toast.")
+    ] = None,
     demonstrations: Annotated[
-        int, typer.Option("--demonstrations", min=1, max=10_000, help="Episodes of the teacher at the start.")
-    ] = 15,
-    rounds: Annotated[int, typer.Option("--rounds", min=0, max=1000, help="Rounds of asking and learning again.")] = 4,
-    questions: Annotated[
-        int, typer.Option("--questions", min=1, max=100_000, help="Takeovers in a round, at most.")
-    ] = 10,
-    rule: Annotated[
-        str, typer.Option("--rule", help="When it asks: {doubts}.", autocompletion=offers("doubts"))
-    ] = "distance",
-    false_alarms: Annotated[
-        float, typer.Option("--false-alarms", help="Share of the episodes that would succeed in which it may ask.")
-    ] = 0.2,
-    noise: Annotated[
-        float,
+        int | None,
+        typer.Option("--demonstrations", min=1, max=10_000, help="Episodes of the teacher at the start; default: 15."),
+    ] = None,
+    rounds: Annotated[
+        int | None,
         typer.Option(
-            "--noise", min=0.0, max=1.0, help="Disturbance of each action: its share of the commanded velocity."
+            "--rounds", min=0, max=1000, help="Rounds of asking and learning again, with --resume in all; default: 4."
         ),
-    ] = 0.1,
+    ] = None,
+    questions: Annotated[
+        int | None,
+        typer.Option("--questions", min=1, max=100_000, help="Takeovers in a round, at most; default: 10."),
+    ] = None,
+    rule: Annotated[
+        str | None,
+        typer.Option("--rule", help="When it asks: {doubts}; default: distance.", autocompletion=offers("doubts")),
+    ] = None,
+    false_alarms: Annotated[
+        float | None,
+        typer.Option(
+            "--false-alarms", help="Share of the episodes that would succeed in which it may ask; default: 0.2."
+        ),
+    ] = None,
+    noise: Annotated[
+        float | None,
+        typer.Option(
+            "--noise", min=0.0, max=1.0, help="Disturbance of each action, a share of the velocity; default: 0.1."
+        ),
+    ] = None,
     evaluated: Annotated[
-        int, typer.Option("--evaluated", min=1, max=100_000, help="Episodes by which each round's student is measured.")
-    ] = 30,
+        int | None,
+        typer.Option(
+            "--evaluated", min=1, max=100_000, help="Episodes by which each round's student is measured; default: 30."
+        ),
+    ] = None,
     teacher: Annotated[
         str, typer.Option("--teacher", help="Who takes over: scripted, or you at the terminal or on a page.")
     ] = "scripted",
     port: Port = 0,
     epochs: Annotated[
-        int, typer.Option("--epochs", min=1, max=100_000, help="Epochs of each student's learning.")
-    ] = 400,
+        int | None,
+        typer.Option("--epochs", min=1, max=100_000, help="Epochs of each student's learning; default: 400."),
+    ] = None,
     resume: Annotated[
         Path | None,
-        typer.Option("--resume", help="Continue the session in this folder, with its options; more --rounds."),
+        typer.Option("--resume", help="Continue the session in this folder, with its own options."),
     ] = None,
-    seed: Seed = 0,
+    seed: Annotated[int | None, typer.Option("--seed", min=0, help="Seed of all random numbers; default: 0.")] = None,
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for datasets (LeRobot), students, mentors and measurements.")
     ] = None,
@@ -76,26 +95,34 @@ def clone(
         raise unknown("teacher", teacher, TEACHERS, "--teacher")
     if plot is not None:
         deferred.check_picture(plot)
+    own = {
+        "demonstrations": demonstrations,
+        "questions": questions,
+        "rule": rule,
+        "false_alarms": false_alarms,
+        "evaluated": evaluated,
+        "epochs": epochs,
+        "seed": seed,
+    }
     if resume is not None:
-        if out is not None:
-            raise BadInput(f"--out beside --resume: the session stays in '{resume}'")
+        for name, value in (own | {"task": task, "noise": noise, "out": out}).items():
+            if value is not None:
+                option = f"--{name.replace('_', '-')}"
+                raise BadInput(
+                    f"{option} beside --resume: the session in '{resume}' goes on as it was begun; remove {option}"
+                )
         kept = deferred.cloning_options_of(resume)
-        kept = replace(kept, options=replace(kept.options, rounds=max(rounds, kept.options.rounds)))
+        if rounds is not None:
+            kept = replace(kept, options=replace(kept.options, rounds=rounds))
     else:
         if out is not None:
             deferred.check_new_cloning(out)
-        options = deferred.CloningOptions(
-            demonstrations=demonstrations,
-            rounds=rounds,
-            questions=questions,
-            rule=rule,
-            false_alarms=false_alarms,
-            evaluated=evaluated,
-            epochs=epochs,
-            seed=seed,
-        )
-        kept = deferred.KeptCloningOptions(deferred.SkillProblem(task, str(skill), noise), options)
+        options = deferred.CloningOptions(**_given(own | {"rounds": rounds}))
+        problem = deferred.SkillProblem(**_given({"task": task, "skill": skill, "noise": noise}))
+        kept = deferred.KeptCloningOptions(problem, options)
         kept.problem.env  # noqa: B018  # a task or skill that is unknown is refused before anything is written
+    if not as_json:
+        console().print(_beginning(kept.options), markup=False)
     folder = resume or out
     measured = list[Any]()
     try:
@@ -113,11 +140,24 @@ def clone(
         "task": kept.problem.task,
         "skill": kept.problem.skill,
         "rule": kept.options.rule,
+        "fps": kept.problem.fps,
         "rounds": [asdict(one) | {"success": one.success} for one in measured],
         "out": None if folder is None else str(folder),
         "plot": None if plot is None else str(plot),
     }
     show(document, as_json, _summary)
+
+
+def _given(values: Mapping[str, Any]) -> dict[str, Any]:
+    """The values that were given; the others have the defaults of their records."""
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def _beginning(options: "deferred.CloningOptions") -> str:
+    return (
+        f"{counted(options.demonstrations, 'demonstration')}, then rounds: in each up to {options.episodes} episodes with a "
+        f"teacher, {options.calibrated} that calibrate the mentor, and {options.evaluated} that measure the student"
+    )
 
 
 @contextmanager
@@ -148,20 +188,22 @@ def _line(measured: Any) -> str:
 def _summary(document: dict[str, Any]) -> "rich.console.RenderableType":
     table = rich.table.Table(box=None, pad_edge=False)
     for number, name in enumerate(
-        ("round", "success", "questions", "corrected steps", "failures doubted", "lead [steps]")
+        ("round", "success", "questions", "corrected steps", "failures doubted", "median lead")
     ):
         table.add_column(name, justify="right" if number else "left")
     for one in document["rounds"]:
-        leads = sorted(one["lead_steps"])
+        leads = one["lead_steps"]
         table.add_row(
             str(one["round"]),
             f"{100 * one['success']:.0f} %",
             str(one["questions"]),
             str(one["corrected_steps"]),
             f"{one['warned']} of {[*one['successes']].count(False)}",
-            str(leads[len(leads) // 2]) if leads else "–",
+            f"{median(leads) / document['fps']:.1f} s" if leads else "–",
         )
     below = [f"{document['skill']} of {document['task']}, asking by '{document['rule']}'"]
+    if document["rule"] not in UNPROMISED and any(one["promise"] is None for one in document["rounds"]):
+        below.append("without a promise: too few of the rollouts that calibrate the mentor succeeded")
     if any(one["rejected"] for one in document["rounds"]):
         below.append("it asks no more: the takeovers have not helped")
     if document["out"]:

@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from lab.learning.settings import USUAL
     from lab.learning.updates import UPDATES
     from lab.mentor.doubts import DOUBTS
-    from lab.mentor.mentor import Mentor
+    from lab.mentor.mentor import Mentor, parted
     from lab.mentor.takeovers import RULES, RulesCompared, rules_compared
     from lab.plugins.code_file import is_file_word, take
     from lab.production import load_run
@@ -220,7 +220,7 @@ TABLE = {
     "lab.learning.settings": ("USUAL",),
     "lab.learning.updates": ("UPDATES",),
     "lab.mentor.doubts": ("DOUBTS",),
-    "lab.mentor.mentor": ("Mentor",),
+    "lab.mentor.mentor": ("Mentor", "parted"),
     "lab.mentor.takeovers": ("RULES", "RulesCompared", "rules_compared"),
     "lab.plugins.code_file": ("is_file_word", "take"),
     "lab.production": ("load_run",),

@@ -9,7 +9,7 @@ from lab.cli import deferred
 from lab.cli.families import offers
 from lab.cli.options import Json, Seed
 from lab.cli.output import console, show
-from lab.errors import BadInput, counted
+from lab.errors import BadInput, counted, shortened
 from lab.lazy import rich
 
 
@@ -34,8 +34,13 @@ def mentor(
         typer.Option("--rollouts", help="For --keep: a dataset of the policy's rollouts without a teacher."),
     ] = None,
     rule: Annotated[
-        str, typer.Option("--rule", help="For --keep, the measure of doubt: {doubts}.", autocompletion=offers("doubts"))
-    ] = "distance",
+        str | None,
+        typer.Option(
+            "--rule",
+            help="For --keep, the measure of doubt: {doubts}; default: distance.",
+            autocompletion=offers("doubts"),
+        ),
+    ] = None,
     seed: Seed = 0,
     as_json: Json = False,
 ) -> None:
@@ -45,6 +50,8 @@ def mentor(
     """
     if (keep is None) != (rollouts is None):
         raise BadInput("--keep and --rollouts: wanted both, or neither")
+    if keep is None and rule is not None:
+        raise BadInput(f"--rule {rule} without --keep: all rules are compared: remove --rule")
     if keep is not None and report is not None:
         raise BadInput("--report beside --keep: a report compares rules: leave one of them away")
     for path, option in ((report, "--report"), (keep, "--keep")):
@@ -52,7 +59,7 @@ def mentor(
             raise BadInput(f"file '{path}' ({option}): wanted a file in a folder that exists")
     recording = deferred.read_recording(dataset)
     if keep is not None and rollouts is not None:
-        show(_kept(recording, rollouts, keep, rule, false_alarms, seed), as_json, _kept_summary)
+        show(_kept(recording, rollouts, keep, rule or "distance", false_alarms, seed), as_json, _kept_summary)
         return
     with deferred.counting(console(), "rules compared") as progress:
         done = iter(range(len(deferred.RULES)))
@@ -72,8 +79,15 @@ def mentor(
 def _kept(recording: Any, rollouts: Path, keep: Path, rule: str, false_alarms: float, seed: int) -> dict[str, Any]:
     """The document of a mentor, after it was learned, calibrated and written."""
     alone = deferred.read_recording(rollouts)
-    made = deferred.Mentor.learn(recording, rule, rollouts=alone.episodes, seed=seed)
-    made.calibrate(alone.episodes, false_alarms=false_alarms)
+    for name in ("fps", "state_names", "action_names"):
+        shown, rolled = getattr(recording, name), getattr(alone, name)
+        if shown != rolled:
+            raise BadInput(
+                f"--rollouts '{rollouts}': {name} {shortened(rolled)}: wanted {shortened(shown)}, as DATASET has"
+            )
+    learned, others = deferred.parted(rule, alone.episodes)
+    made = deferred.Mentor.learn(recording, rule, rollouts=learned, seed=seed)
+    made.calibrate(others, false_alarms=false_alarms)
     made.save(keep)
     promise = made.promise
     assert promise is not None

@@ -93,6 +93,13 @@ def loaded(folder: Path, demonstrations: Recording) -> Cloning | None:
         measured.append(read_json(of_round / MEASURED, Measured, f"round '{of_round}'", _WANTED))
         if (of_round / CORRECTIONS).is_dir():
             corrections += read(of_round / CORRECTIONS).episodes
+    later = [
+        path.name for path in folder.glob("round-*") if path.name[6:].isdigit() and int(path.name[6:]) >= len(measured)
+    ]
+    if later:
+        raise BadInput(
+            f"session '{folder}' (--resume): it holds '{later[0]}', but no 'round-{len(measured)}' before it"
+        )
     if not measured:
         return None
     last = _of_round(folder, len(measured) - 1)

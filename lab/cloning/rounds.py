@@ -5,14 +5,14 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, Protocol
 
 import numpy as np
-from annotated_types import Gt, Lt
+from annotated_types import Ge, Gt, Lt
 from numpy.typing import NDArray
 
 from lab.cloning.student import EPOCHS, Student
 from lab.errors import BadInput, check_value, unknown
 from lab.mentor.conformal import Promise
 from lab.mentor.doubts import DOUBTS, UNCALIBRATED
-from lab.mentor.mentor import Mentor, Question
+from lab.mentor.mentor import Mentor, Question, parted
 from lab.recordings.episode import Episode, Recording
 
 Action = NDArray[np.float32]
@@ -56,6 +56,19 @@ class CloningOptions:
         if self.rule not in DOUBTS:
             raise unknown("rule", self.rule, tuple(DOUBTS), "clone")
         check_value("false_alarms", self.false_alarms, Annotated[float, Gt(0), Lt(1)], "clone")
+        check_value("rounds", self.rounds, Annotated[int, Ge(0)], "clone")
+        check_value("seed", self.seed, Annotated[int, Ge(0)], "clone")
+        for name in (
+            "demonstrations",
+            "questions",
+            "takeover_steps",
+            "calibrated",
+            "episodes",
+            "every_steps",
+            "evaluated",
+            "epochs",
+        ):
+            check_value(name, getattr(self, name), Annotated[int, Ge(1)], "clone")
 
 
 @dataclass(frozen=True)
@@ -175,17 +188,18 @@ def _mentor(
         return Mentor.learn(recording, options.rule, seed=options.seed)
     seeds = seeds_for(options, CALIBRATING, options.calibrated, number)
     rollouts = [student.planned(roll_out(student, seed)) for seed in seeds]
+    learned, others = parted(options.rule, rollouts)
     try:
-        mentor = Mentor.learn(recording, options.rule, rollouts=rollouts, seed=options.seed)
+        mentor = Mentor.learn(recording, options.rule, rollouts=learned, seed=options.seed)
     except BadInput:  # the failure predictor, when all rollouts or none failed
         mentor = Mentor.learn(recording, "distance", seed=options.seed)
     if options.rule in ("random", "clock"):
         often = options.every_steps
         mentor.threshold = 1.0 - 1.0 / often if options.rule == "random" else often - 1.5  # the clock counts from 0
         return mentor
-    well = [episode for episode in rollouts if episode.success]
+    well = [episode for episode in others if episode.success]
     if (len(well) + 1) * options.false_alarms >= 1.0:
-        return mentor.calibrate(rollouts, false_alarms=options.false_alarms)
+        return mentor.calibrate(others, false_alarms=options.false_alarms)
     mentor.threshold = max(
         (mentor.peak(episode) for episode in well), default=-np.inf
     )  # a promise takes more successes

@@ -6,6 +6,7 @@ from functools import cached_property
 
 from lab.cloning.rounds import DEMONSTRATING, Asks, CloningOptions, Policy, seeds_for
 from lab.control import ControlEnv, ScriptedTeacher, recording, roll_out
+from lab.control.control_env import CONTROL_S
 from lab.recordings.episode import Episode, Recording
 
 
@@ -26,6 +27,11 @@ class SkillProblem:
     def env(self) -> ControlEnv:
         """The environment, with states as observations."""
         return ControlEnv(self.task, self.skill, noise=self.noise, seconds=self.seconds)
+
+    @property
+    def fps(self) -> int:
+        """Steps a second."""
+        return round(1 / CONTROL_S)
 
     @cached_property
     def teacher(self) -> Policy:

@@ -59,7 +59,7 @@ class Doubt(Protocol):
 class Measure:
     """The base of the measures: what was learned of one stands in `arrays`, which is all that a file keeps of it."""
 
-    needs: ClassVar[str] = ""  # what a policy has to hand over at each step: "chunk", or nothing
+    learns_from_rollouts: ClassVar[bool] = False  # which then calibrate nothing: in them it doubts less than in others
 
     def __init__(self, demonstrated: Demonstrated, arrays: Arrays) -> None:
         self.demonstrated, self.arrays = demonstrated, arrays
@@ -142,8 +142,6 @@ class ChunkDisagreement(Measure):
     Source: temporal consistency of action chunks (Agia et al. 2024, STAC).
     """
 
-    needs = "chunk"
-
     def begin(self) -> None:
         """Forgets the plan."""
         self._before: Array | None = None
@@ -183,6 +181,8 @@ class FailurePredictor(Measure):
 
     It looks at the state, the other measures of doubt and the time; it is learned from rollouts of which some failed.
     """
+
+    learns_from_rollouts = True
 
     def begin(self) -> None:
         """No step has been seen."""

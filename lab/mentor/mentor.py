@@ -74,6 +74,7 @@ class Mentor:
         self.rule, self.demonstrated, self.arrays = rule, demonstrated, arrays
         self.state_names, self.action_names = tuple(state_names), tuple(action_names)
         self.threshold, self.promise, self.judge = threshold, promise, Judge()
+        self._learned: set[bytes] = set()  # the states of rollouts that calibrate nothing
         self._doubt: Doubt = DOUBTS[rule].make(demonstrated, arrays)
         self.begin()
 
@@ -85,16 +86,22 @@ class Mentor:
     ) -> Self:
         """A mentor for policies that were cloned from a recording; it never asks until `calibrate` sets its threshold.
 
-        rollouts: of the policy, with known success: what the rule "failure" learns from. seed: of all draws.
+        rollouts: of the policy, with known success: what the rule "failure" learns from; other ones calibrate it. seed: of all
+        draws.
         Raises BadInput for an unknown rule, and if nothing was demonstrated.
         """
         if rule not in DOUBTS:
             raise unknown("rule", rule, tuple(DOUBTS), "mentor")
-        rng = np.random.default_rng(seed)
+        rng, seen = np.random.default_rng(seed), tuple(rollouts)
         demonstrated = Demonstrated.of(recording.episodes, rng)
-        arrays = DOUBTS[rule].make.learned(demonstrated, tuple(rollouts), rng)
         threshold = 0.0 if rule in UNCALIBRATED else float("inf")
-        return cls(rule, demonstrated, arrays, recording.state_names, recording.action_names, threshold)
+        for number, episode in enumerate(seen):
+            _check_widths(episode, number, recording.state_names, recording.action_names)
+        arrays = DOUBTS[rule].make.learned(demonstrated, seen, rng)
+        mentor = cls(rule, demonstrated, arrays, recording.state_names, recording.action_names, threshold)
+        if DOUBTS[rule].make.learns_from_rollouts:
+            mentor._learned = {episode.states.tobytes() for episode in seen}
+        return mentor
 
     def calibrate(
         self,
@@ -108,13 +115,23 @@ class Mentor:
 
         false_alarms: the share of the successful episodes in which it may ask; or caught: the share of the failed ones in which
         it has to, `lead` steps before their ends or sooner. The promise holds for episodes that are exchangeable with these.
-        Raises BadInput unless one of the two is given, and if there are too few episodes for it.
+        Raises BadInput unless one of the two is given, if there are too few episodes for it, and for an episode from which the
+        rule has learned.
         """
         if (false_alarms is None) == (caught is None):
             raise BadInput("calibrate: wanted false_alarms= or caught=, one of the two")
         if self.rule in UNCALIBRATED:
             raise BadInput(f"rule '{self.rule}' (calibrate): it asks {self.rule}: there is no threshold to set")
-        chosen = [e for e in rollouts if not e.corrected.any() and e.success is (caught is None)]
+        given = [*rollouts]
+        for number, episode in enumerate(given):
+            _check_widths(episode, number, self.state_names, self.action_names)
+            if episode.states.tobytes() in self._learned:
+                raise BadInput(
+                    f"rollout {number} (calibrate): the rule '{self.rule}' has learned from it: wanted other ones"
+                )
+        if given and all(episode.success is None for episode in given):
+            raise BadInput("rollouts (calibrate): of none is it known whether it succeeded: wanted a success for each")
+        chosen = [e for e in given if not e.corrected.any() and e.success is (caught is None)]
         if false_alarms is not None:
             self.promise = few_false_alarms([self.peak(episode) for episode in chosen], false_alarms)
         elif caught is not None:
@@ -205,6 +222,16 @@ class Mentor:
         return mentor
 
 
+def parted(rule: str, rollouts: Sequence[Episode]) -> tuple[Sequence[Episode], Sequence[Episode]]:
+    """The rollouts from which a rule learns, none for most, and those that calibrate it: every second one, in turn.
+
+    Raises BadInput for an unknown rule.
+    """
+    if rule not in DOUBTS:
+        raise unknown("rule", rule, tuple(DOUBTS), "mentor")
+    return (rollouts[::2], rollouts[1::2]) if DOUBTS[rule].make.learns_from_rollouts else ((), rollouts)
+
+
 def _numbers(given: Any, names: Sequence[str], what: str, feature: str) -> Array:
     """The numbers (n,) of an observation or an action, in the order of the recording's names."""
     if isinstance(given, Mapping):
@@ -221,6 +248,15 @@ def _numbers(given: Any, names: Sequence[str], what: str, feature: str) -> Array
             f"{what} (mentor): {counted(len(numbers), 'number')}: wanted {len(names)} finite ones, as the recording has"
         )
     return numbers
+
+
+def _check_widths(episode: Episode, number: int, state_names: Sequence[str], action_names: Sequence[str]) -> None:
+    widths, wanted = (episode.states.shape[1], episode.actions.shape[1]), (len(state_names), len(action_names))
+    if widths != wanted:
+        raise BadInput(
+            f"rollout {number} (mentor): {widths[0]} states and {widths[1]} actions: wanted {wanted[0]} and {wanted[1]}, as "
+            "the demonstrations have"
+        )
 
 
 def _rows(given: Any, width: int, what: str) -> Array | None:

@@ -13,6 +13,9 @@ def test_it_clones_asks_and_goes_on(lab: Callable[..., Any], tmp_path: Path) -> 
     out = tmp_path / "grasp"
     first = lab("clone", "grasp", *SHORT, "--rounds", "0", "--out", str(out), "--json").json
     assert [one["questions"] for one in first["rounds"]] == [0]
+    again = lab("clone", "--resume", str(out), "--json").json  # it keeps its number of rounds
+    assert [one["round"] for one in again["rounds"]] == [0]
+    assert lab("clone", "--resume", str(out), "--rule", "never").err.startswith("lab: --rule beside --resume")
     plot = tmp_path / "rounds.svg"
     after = lab("clone", "--resume", str(out), "--rounds", "1", "--plot", str(plot))
     assert ">round 1</text>" in plot.read_text(encoding="utf-8")

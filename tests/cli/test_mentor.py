@@ -28,7 +28,8 @@ def datasets(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     }
     for name, held in episodes.items():
         write(Recording(1, "cart", ("x",), ("dx",), held), folder / name)
-    return {name: folder / name for name in episodes}
+    write(Recording(1, "cart", ("y",), ("dx",), episodes["alone"]), folder / "other")
+    return {name: folder / name for name in (*episodes, "other")}
 
 
 def test_it_compares_the_rules(lab: Any, datasets: dict[str, Path], tmp_path: Path) -> None:
@@ -60,6 +61,8 @@ def test_it_keeps_a_mentor_with_its_promise(lab: Any, datasets: dict[str, Path],
         (["nothing"], "nothing"),
         (["{shown}"], "takeovers"),
         (["{taken}", "--keep", "x"], "--rollouts"),
+        (["{taken}", "--rule", "failure"], "--keep"),
+        (["{shown}", "--rollouts", "{other}", "--keep", "m"], "state_names"),
         (["{taken}", "--report", "no/such/folder.html"], "--report"),
         (["{taken}", "--false-alarms", "0.01"], "0.01"),
         (["{shown}", "--rollouts", "{alone}", "--keep", "m", "--rule", "distanc"], "did you mean 'distance'"),

@@ -4,6 +4,7 @@ import json
 from collections.abc import Generator, Iterator
 from dataclasses import asdict, replace
 from pathlib import Path
+from shutil import copytree, rmtree
 
 import pytest
 
@@ -68,6 +69,14 @@ def test_a_session_that_ended_can_have_more_rounds(session: Path, kept: KeptOpti
     assert [after.measured[-1].round for after in rounds_of(kept, session)] == [2]
     more = replace(kept, options=replace(FEW, rounds=3))
     assert [after.measured[-1].round for after in rounds_of(more, session)] == [2, 3]
+
+
+def test_a_folder_without_one_of_its_rounds_is_refused(session: Path, kept: KeptOptions, tmp_path: Path) -> None:
+    folder = tmp_path / "gap"
+    copytree(session, folder)
+    rmtree(folder / "round-1")
+    with pytest.raises(BadInput, match="no 'round-1' before it"):
+        next(rounds_of(kept, folder))
 
 
 def test_another_folder_is_refused(session: Path, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from lab.errors import BadInput
 from lab.mentor.doubts import DOUBTS, UNCALIBRATED
-from lab.mentor.mentor import Mentor
+from lab.mentor.mentor import Mentor, parted
 from lab.mentor.mentor_file import Kept, decode, encode
 from lab.recordings.episode import Episode, Recording
 from tests.mentor.conftest import Run
@@ -69,6 +69,35 @@ def test_there_is_nothing_to_calibrate_in_always_and_never(recording: Recording,
         mentor.calibrate([straight] * 9, false_alarms=0.1)
 
 
+def test_rollouts_from_which_a_rule_learned_do_not_calibrate_it(
+    recording: Recording, run: Run, straight: Episode
+) -> None:
+    """In them it doubts less than in others, so that its promise would not hold."""
+    stuck = run([0.1 * min(step, 3) for step in range(11)], success=False)
+    others = [run([0.001 * number, *(0.1 * step for step in range(1, 11))]) for number in range(1, 10)]
+    learned, rest = parted("failure", [straight, others[0], stuck, *others[1:]])
+    assert [*learned] == [straight, stuck, *others[2::2]]
+    mentor = Mentor.learn(recording, "failure", rollouts=learned)
+    with pytest.raises(BadInput, match=r"rollout 0 \(calibrate\): the rule 'failure' has learned from it"):
+        mentor.calibrate([straight] * 9, false_alarms=0.2)
+    assert mentor.calibrate(rest, false_alarms=0.2).promise is not None
+    assert parted("distance", others) == ((), others)
+    Mentor.learn(recording, "distance", rollouts=others).calibrate(others, false_alarms=0.2)  # which learns from none
+
+
+def test_rollouts_of_another_robot_are_refused(recording: Recording) -> None:
+    wide = Episode("go", np.zeros((3, 2), np.float32), np.zeros((3, 1), np.float32), np.zeros(3, bool), True)
+    with pytest.raises(BadInput, match=r"rollout 0.*2 states and 1 actions: wanted 1 and 1"):
+        Mentor.learn(recording).calibrate([wide] * 9, false_alarms=0.2)
+    with pytest.raises(BadInput, match="rollout 0"):
+        Mentor.learn(recording, "failure", rollouts=[wide])
+
+
+def test_rollouts_without_a_known_success_are_refused(recording: Recording, run: Run) -> None:
+    with pytest.raises(BadInput, match="of none is it known"):
+        Mentor.learn(recording).calibrate([run([0.0, 0.1], success=None)] * 9, false_alarms=0.2)
+
+
 def test_it_takes_observations_by_name_and_tensors(recording: Recording) -> None:
     mentor = Mentor.learn(recording)
     alone = mentor([0.5], [0.1]).doubt
@@ -107,7 +136,8 @@ def test_a_file_gives_the_mentor_back(
     stuck = run([0.1 * min(step, 3) for step in range(11)], success=False)
     mentor = Mentor.learn(recording, rule, rollouts=[straight, stuck])
     if rule not in (*UNCALIBRATED, "chunk"):
-        mentor.calibrate([straight] * 9, false_alarms=0.2)
+        others = [run([0.01 * number, *(0.1 * step for step in range(1, 11))]) for number in range(1, 10)]
+        mentor.calibrate(others, false_alarms=0.2)
     mentor.save(tmp_path / "mentor.safetensors")
     back = Mentor.load(tmp_path / "mentor.safetensors")
     assert (back.rule, back.threshold, back.promise) == (mentor.rule, mentor.threshold, mentor.promise)
