@@ -51,7 +51,7 @@ class Mentor:
         >>> def right(start):
         ...     places = np.linspace(start, start + 1, 21, dtype=np.float32)[:, None]
         ...     return lab.Episode("go right", places, np.ones_like(places), np.zeros(21, bool), success=True)
-        >>> shown, alone = [right(0.0), right(0.1)], [right(0.01 * number) for number in range(9)]
+        >>> shown, alone = [right(0.0), right(0.1)], [right(0.01 * number) for number in range(1, 10)]
         >>> mentor = lab.Mentor.learn(lab.Recording(10, "cart", ("x",), ("speed",), shown), "distance")
         >>> mentor.calibrate(alone, false_alarms=0.1).promise.kind
         'false alarms'
@@ -74,7 +74,7 @@ class Mentor:
         self.rule, self.demonstrated, self.arrays = rule, demonstrated, arrays
         self.state_names, self.action_names = tuple(state_names), tuple(action_names)
         self.threshold, self.promise, self.judge = threshold, promise, Judge()
-        self._learned: set[bytes] = set()  # the states of rollouts that calibrate nothing
+        self._learned: set[bytes] = set()  # the states of episodes that calibrate nothing: in them it doubts less
         self._doubt: Doubt = DOUBTS[rule].make(demonstrated, arrays)
         self.begin()
 
@@ -99,8 +99,8 @@ class Mentor:
             _check_widths(episode, number, recording.state_names, recording.action_names)
         arrays = DOUBTS[rule].make.learned(demonstrated, seen, rng)
         mentor = cls(rule, demonstrated, arrays, recording.state_names, recording.action_names, threshold)
-        if DOUBTS[rule].make.learns_from_rollouts:
-            mentor._learned = {episode.states.tobytes() for episode in seen}
+        learned = (*recording.episodes, *(seen if DOUBTS[rule].make.learns_from_rollouts else ()))
+        mentor._learned = {episode.states.tobytes() for episode in learned}
         return mentor
 
     def calibrate(
@@ -116,7 +116,7 @@ class Mentor:
         false_alarms: the share of the successful episodes in which it may ask; or caught: the share of the failed ones in which
         it has to, `lead` steps before their ends or sooner. The promise holds for episodes that are exchangeable with these.
         Raises BadInput unless one of the two is given, if there are too few episodes for it, and for an episode from which the
-        rule has learned.
+        mentor has learned.
         """
         if (false_alarms is None) == (caught is None):
             raise BadInput("calibrate: wanted false_alarms= or caught=, one of the two")
@@ -126,9 +126,7 @@ class Mentor:
         for number, episode in enumerate(given):
             _check_widths(episode, number, self.state_names, self.action_names)
             if episode.states.tobytes() in self._learned:
-                raise BadInput(
-                    f"rollout {number} (calibrate): the rule '{self.rule}' has learned from it: wanted other ones"
-                )
+                raise BadInput(f"rollout {number} (calibrate): the mentor has learned from it: wanted other ones")
         if given and all(episode.success is None for episode in given):
             raise BadInput("rollouts (calibrate): of none is it known whether it succeeded: wanted a success for each")
         chosen = [e for e in given if not e.corrected.any() and e.success is (caught is None)]

@@ -24,7 +24,7 @@ def datasets(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     episodes = {
         "taken": [cart(straight) for _ in range(12)] + [cart(strayed, (5,)) for _ in range(3)],
         "shown": [cart(straight) for _ in range(4)],
-        "alone": [cart([place + 0.01 * number for place in straight]) for number in range(9)],
+        "alone": [cart([place + 0.01 * number for place in straight]) for number in range(1, 10)],
     }
     for name, held in episodes.items():
         write(Recording(1, "cart", ("x",), ("dx",), held), folder / name)
@@ -63,6 +63,7 @@ def test_it_keeps_a_mentor_with_its_promise(lab: Any, datasets: dict[str, Path],
         (["{taken}", "--keep", "x"], "--rollouts"),
         (["{taken}", "--rule", "failure"], "--keep"),
         (["{shown}", "--rollouts", "{other}", "--keep", "m"], "state_names"),
+        (["{shown}", "--rollouts", "{shown}", "--keep", "m"], "has learned from it"),
         (["{taken}", "--report", "no/such/folder.html"], "--report"),
         (["{taken}", "--false-alarms", "0.01"], "0.01"),
         (["{shown}", "--rollouts", "{alone}", "--keep", "m", "--rule", "distanc"], "did you mean 'distance'"),

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from lab.mentor.mentor import Mentor
-from lab.recordings.episode import Episode, Recording
+from lab.recordings.episode import Recording
+from tests.mentor.conftest import Run
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLE = (ROOT / "examples" / "lerobot_asking_rollout.py").read_text(encoding="utf-8")
@@ -33,9 +34,10 @@ class Engine:
 
 
 @pytest.fixture
-def mentor(recording: Recording, straight: Episode) -> Mentor:
+def mentor(recording: Recording, run: Run) -> Mentor:
     """It asks where the cart is off the line from 0 to 1."""
-    return Mentor.learn(recording, "distance").calibrate([straight] * 9, false_alarms=0.1)
+    beside = run([0.1 * step + 0.001 for step in range(11)])
+    return Mentor.learn(recording, "distance").calibrate([beside] * 9, false_alarms=0.1)
 
 
 @pytest.fixture

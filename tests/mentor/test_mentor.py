@@ -78,9 +78,11 @@ def test_rollouts_from_which_a_rule_learned_do_not_calibrate_it(
     learned, rest = parted("failure", [straight, others[0], stuck, *others[1:]])
     assert [*learned] == [straight, stuck, *others[2::2]]
     mentor = Mentor.learn(recording, "failure", rollouts=learned)
-    with pytest.raises(BadInput, match=r"rollout 0 \(calibrate\): the rule 'failure' has learned from it"):
+    with pytest.raises(BadInput, match=r"rollout 0 \(calibrate\): the mentor has learned from it"):
         mentor.calibrate([straight] * 9, false_alarms=0.2)
     assert mentor.calibrate(rest, false_alarms=0.2).promise is not None
+    with pytest.raises(BadInput, match="rollout 1"):
+        Mentor.learn(recording).calibrate([others[0], straight], false_alarms=0.5)  # which is demonstrated
     assert parted("distance", others) == ((), others)
     Mentor.learn(recording, "distance", rollouts=others).calibrate(others, false_alarms=0.2)  # which learns from none
 
