@@ -19,6 +19,7 @@ from lab.studies.runner import Job, seeds_of
 from lab_studies.comparisons.clone import DOUBTING, NOISE
 
 SKILLS = ("grasp", "place")
+RULES = (*DOUBTING, "clock", "random")
 OPTIONS = CloningOptions()
 ROLLOUTS, LEARNED_FROM = 200, 40  # of a student, and of them those from which the rule "failure" learns
 CALIBRATED, SPLITS = 19, 200  # episodes of a kind that calibrate, and how often they are drawn
@@ -87,7 +88,7 @@ def kept_by_rules(roll_out: RollsOut, shown: Recording, options: CloningOptions,
     episodes = [student.planned(roll_out(student, seed)) for seed in seeds_for(options, EVALUATING, rollouts)]
     learned, others = episodes[: LEARNED_FROM * rollouts // ROLLOUTS], episodes[LEARNED_FROM * rollouts // ROLLOUTS :]
     measured: Measured = {}
-    for rule in DOUBTING:
+    for rule in RULES:
         try:
             mentor = Mentor.learn(shown, rule, rollouts=learned, seed=options.seed)
         except BadInput:  # the failure predictor, if all have failed or none has

@@ -7,8 +7,7 @@ from lab.cloning.rounds import CloningOptions
 from lab.mentor.mentor import Mentor
 from lab.recordings.episode import Episode, Recording
 from lab.studies.findings import those
-from lab_studies.comparisons.clone import DOUBTING
-from lab_studies.comparisons.promises import kept_by_rules, rows_of, shares_of
+from lab_studies.comparisons.promises import RULES, kept_by_rules, rows_of, shares_of
 from tests.cloning.conftest import rolled_out, straight_on
 
 pytestmark = pytest.mark.studies
@@ -39,7 +38,7 @@ def test_every_rule_is_measured_in_rollouts_of_a_student() -> None:
     options = CloningOptions(epochs=30)
     shown = Recording(10, "point", ("x",), ("speed",), [rolled_out(straight_on, seed) for seed in (1, 2)])
     found = kept_by_rules(rolled_out, shown, options, rollouts=50)
-    assert {rule for rule, _, _ in found} >= {*DOUBTING} - {"failure"}  # which needs a rollout that failed
+    assert {rule for rule, _, _ in found} >= {*RULES} - {"failure"}  # which needs a rollout that failed
     assert kept_by_rules(rolled_out, shown, options, rollouts=50) == found
     (row,) = those(rows_of("point", [found, found]), rule="distance", promised=0.1, measure="false_alarms_percent")
     assert 0.0 <= row["value"] <= 100.0
