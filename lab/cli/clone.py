@@ -43,7 +43,7 @@ def clone(
     ] = None,
     rule: Annotated[
         str | None,
-        typer.Option("--rule", help="When it asks: {doubts}; default: distance.", autocompletion=offers("doubts")),
+        typer.Option("--rule", help="When it asks: {doubts}; default: progress.", autocompletion=offers("doubts")),
     ] = None,
     false_alarms: Annotated[
         float | None,

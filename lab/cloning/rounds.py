@@ -43,7 +43,7 @@ class CloningOptions:
     rounds: int = 4
     questions: int = 10
     takeover_steps: int = 10
-    rule: str = "distance"
+    rule: str = "progress"
     false_alarms: float = 0.2
     calibrated: int = 20
     episodes: int = 40
