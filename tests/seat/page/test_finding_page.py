@@ -36,7 +36,7 @@ def test_it_shows_the_map_and_each_proposal_once(panel: FindingPanel) -> None:
     assert [(one["mark"], one["name"], one["more"]) for one in known["proposals"]] == [("1", "doorway 1", 0)]
     assert not panel.stirred()
     assert news(panel) == {}
-    panel.tell("done")
+    panel.tell(said="done")
     assert news(panel)["seat"]["said"] == "done"
 
 
@@ -50,7 +50,7 @@ def test_another_message_is_refused_and_the_choice_is_waited_for(panel: FindingP
     panel.said(1, message)
     assert news(panel)["refusal"]
     panel.said(1, '{"names": [null]}')
-    assert panel.wait() == [None]
+    assert panel.answer() == [None]
 
 
 def test_a_choice_is_made_once(panel: FindingPanel) -> None:
@@ -58,7 +58,7 @@ def test_a_choice_is_made_once(panel: FindingPanel) -> None:
     news(panel)
     panel.said(1, '{"names": [null]}')
     assert "already" in news(panel)["refusal"]
-    assert panel.wait() == ["hall"]
+    assert panel.answer() == ["hall"]
     panel.left(1)
     assert panel.news(1) == ""
 

@@ -9,7 +9,7 @@ import pytest
 from lab.cloning.person import Situation
 from lab.cloning.takeover_command import TakeoverCommand
 from lab.control import ControlEnv
-from lab.seat.page.takeover_page import MAX_CHARS, TakeoverPage, TakeoverPanel
+from lab.seat.page.takeover_page import TakeoverPage, TakeoverPanel
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -44,7 +44,7 @@ def test_a_page_is_told_the_question_and_its_command_is_taken() -> None:
         ('{"command": 3}', "no message"),
         ('{"command": "ahed"}', "did you mean"),
         (b"\xff", "no message"),
-        ('{"command": "' + "a" * MAX_CHARS + '"}', "no message"),
+        ('{"command": "' + "a" * TakeoverPanel.most_chars + '"}', "no message"),
     ],
 )
 def test_what_is_no_command_is_refused_on_that_page_alone(message: str | bytes, told: str) -> None:
@@ -57,6 +57,16 @@ def test_what_is_no_command_is_refused_on_that_page_alone(message: str | bytes, 
     panel.said(1, message)
     assert told in news(panel, 1)["refusal"]
     assert panel.news(2) == ""
+
+
+def test_the_first_command_counts() -> None:
+    panel = TakeoverPanel()
+    panel.joined(1)
+    panel.ask(SEEN)
+    panel.said(1, json.dumps({"command": "up 1"}))
+    panel.said(1, json.dumps({"command": "down 1"}))
+    assert panel.command().moved[2] == pytest.approx(0.01)
+    assert "Nothing is asked" in news(panel)["refusal"]
 
 
 def test_a_command_that_nobody_asked_for_is_refused() -> None:
