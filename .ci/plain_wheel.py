@@ -172,6 +172,7 @@ def refused(place: Place) -> None:
     install = "is not installed: pip install '.[{}]'"
     place.run("tune", "small.txt", code=WRONG_INPUT, said=install.format("tune"))
     place.run("toolbox", "list", "--toolbox", "s3://lab/box", code=WRONG_INPUT, said=install.format("remote"))
+    place.run("clone", "place", "--out", "cloned", code=WRONG_INPUT, said=install.format("recordings"))
     dask = ("study", "run", "table-9.2", "--dask", "127.0.0.1:9")
     place.run(*dask, code=WRONG_INPUT, said=install.format("dask"))
     place.run("replay", "kept", "--minari", "lab/kept-v0", code=WRONG_INPUT, said=install.format("data"))
@@ -222,8 +223,10 @@ def with_people(place: Place) -> None:
 
 
 def with_recordings(place: Place) -> None:
-    """A dataset with pictures is written and read, as the page about it does."""
+    """A dataset with pictures is written and read, as the page about it does; a skill is cloned."""
     page_run(place, ROOT / "docs" / "recordings.md")
+    few = ("--demonstrations", "2", "--rounds", "0", "--evaluated", "1", "--epochs", "5")
+    place.run("clone", "place", *few, "--out", "cloned")
 
 
 def arms_compared(place: Place, *options: str, **wanted: Any) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from types import ModuleType
 
 from lab.errors import BadInput, out_of_memory
@@ -44,6 +45,14 @@ def require(use: str, *libraries: ModuleType, extra: str | None = None) -> None:
     with optional(use, extra):
         for library in libraries:
             load(library)
+
+
+def require_extra(use: str, extra: str) -> None:
+    """Raises BadInput, as `optional` does, unless all libraries of an extra are installed; loads none of them."""
+    with optional(use, extra):
+        for library in EXTRAS[extra]:
+            if find_spec(library) is None:
+                raise ModuleNotFoundError(name=library)
 
 
 def _missing(error: BaseException | None) -> str | None:

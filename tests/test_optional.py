@@ -119,6 +119,10 @@ TABLE = "import lab; lab.teach('world-1', advisor=None, episodes=2).{}"
         ("minari", (*REPLAY, "--minari", "lab/kept-v0"), "dataset 'lab/kept-v0': {} '.[data]' {}"),
         ("h5py", (*REPLAY, "--minari", "lab/kept-v0"), "dataset 'lab/kept-v0': {} '.[data]' {}"),
         ("tensorboard", (*REPLAY, "--tensorboard", "curves"), "folder 'curves': {} '.[data]' {}"),
+        *(
+            (library, ("clone", "place", "--out", "cloned"), "lab clone: {} '.[recordings]' {}")
+            for library in ("av", "pyarrow", "sklearn", "threadpoolctl")
+        ),
         ("pyarrow", ("study", "export", "nowhere", "--out", "x", "--parquet"), "--parquet: {} '.[people]' {}"),
     ],
 )

@@ -95,6 +95,7 @@ def clone(
         raise unknown("teacher", teacher, TEACHERS, "--teacher")
     if plot is not None:
         deferred.check_picture(plot)
+    deferred.require_extra("lab clone", "recordings")
     own = {
         "demonstrations": demonstrations,
         "questions": questions,

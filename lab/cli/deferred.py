@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     from lab.mentor.doubts import DOUBTS
     from lab.mentor.mentor import Mentor, parted
     from lab.mentor.takeovers import RULES, RulesCompared, rules_compared
+    from lab.optional import require_extra
     from lab.plugins.code_file import is_file_word, take
     from lab.production import load_run
     from lab.production.composer import Conditions
@@ -222,6 +223,7 @@ TABLE = {
     "lab.mentor.doubts": ("DOUBTS",),
     "lab.mentor.mentor": ("Mentor", "parted"),
     "lab.mentor.takeovers": ("RULES", "RulesCompared", "rules_compared"),
+    "lab.optional": ("require_extra",),
     "lab.plugins.code_file": ("is_file_word", "take"),
     "lab.production": ("load_run",),
     "lab.production.composer": ("Conditions",),

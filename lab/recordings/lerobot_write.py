@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from lab.errors import BadInput, WorkFailed, shortened
 from lab.files import draft, write_whole
 from lab.operating_system import replace
+from lab.optional import require_extra
 from lab.recordings.episode import Episode, Recording
 from lab.recordings.lerobot_info import (
     ACTION,
@@ -75,6 +76,7 @@ class Writer:
         sizes: FileSizes | None = None,
     ) -> None:
         """Checks the arguments; writes nothing. Raises BadInput if the folder exists."""
+        require_extra("a LeRobot dataset", "recordings")
         check_free(folder)
         if not 1 <= fps <= MOST_FPS:
             raise BadInput(f"fps {fps}: wanted 1 to {MOST_FPS}")
