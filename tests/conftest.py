@@ -314,3 +314,14 @@ def until() -> Until:
         )
 
     return wait
+
+
+@pytest.fixture
+def paused(until: Until) -> Callable[["Page"], None]:
+    """Stop a replay that has begun; on a slow machine it may have ended before, and its button would play it again."""
+
+    def pause(page: "Page") -> None:
+        until(page, "player.state().playing || player.state().time > 0")
+        page.keyboard.press("p")  # the beginning of the move before, which pauses
+
+    return pause

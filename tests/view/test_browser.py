@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from playwright.sync_api import Page
 
 Until = Callable[["Page", str], None]
+Paused = Callable[["Page"], None]
 HALF = 0.5**0.5
 WHITE, BROWN = (1.0, 1.0, 1.0, 1.0), (0.5, 0.0, 0.0, 0.5)
 # where the slice is at the simulated seconds 3, 4 and 5, the last turned by a quarter about z
@@ -169,12 +170,11 @@ def test_the_replay_plays_from_disk_without_a_network(
 
 
 def test_colours_and_visibility_step_in_the_replay(
-    browser_page: "Page", recording: Recording, tmp_path: Path, until: Until
+    browser_page: "Page", recording: Recording, tmp_path: Path, paused: Paused
 ) -> None:
     recording.frames[2] = Frame(5.0, {"slice 1": POSES[2]}, {"slice 1": WHITE}, {"arm": True})
     browser_page.goto(replay_html(recording, tmp_path / "replay.html").as_uri())
-    until(browser_page, "player.state().playing")
-    browser_page.click("#play")
+    paused(browser_page)
     start = (*recording.bodies[2].shapes[0].rgba, True)
     for time_s, expected in ((0.5, start), (1.5, (*BROWN, False)), (2.5, (*WHITE, True)), (0.2, start)):
         browser_page.evaluate("time => viewer.animator.seek(time)", time_s)
@@ -183,9 +183,11 @@ def test_colours_and_visibility_step_in_the_replay(
         assert look_of(browser_page, "arm")["visible"] is expected[4]
 
 
-def test_the_slider_moves_the_replay(browser_page: "Page", recording: Recording, tmp_path: Path, until: Until) -> None:
+def test_the_slider_moves_the_replay(
+    browser_page: "Page", recording: Recording, tmp_path: Path, until: Until, paused: Paused
+) -> None:
     browser_page.goto(replay_html(recording, tmp_path / "replay.html").as_uri())
-    browser_page.click("#play")
+    paused(browser_page)
     browser_page.evaluate("const s = document.getElementById('seek'); s.value = 1; s.dispatchEvent(new Event('input'))")
     assert pose_of(browser_page, "slice 1") == pytest.approx(POSES[1], abs=3e-4)
     until(browser_page, "document.getElementById('note').textContent.startsWith('4.0 s')")
@@ -199,15 +201,14 @@ def test_a_still_recording_has_no_player(browser_page: "Page", recording: Record
 
 
 def test_keys_go_from_move_to_move_and_the_words_the_chart_and_the_slider_follow(
-    browser_page: "Page", recording: Recording, tmp_path: Path, until: Until
+    browser_page: "Page", recording: Recording, tmp_path: Path, paused: Paused
 ) -> None:
     done = Activity("robot", "carry", 1, "plate", "toaster", 3.0, 5.0)
     schedule = Schedule((done,), (), (), 5.0, (1,))
     told = ((3.0, "The robot grasps slice 1"), (4.0, "The robot waits"))
     story = Story(schedule, schedule, told, (Mark(4.0, "stop", "pause"),), (3.0, 4.0))
     browser_page.goto(replay_html(recording, tmp_path / "replay.html", speed=1, story=story).as_uri())
-    until(browser_page, "player.state().playing")
-    browser_page.keyboard.press(" ")
+    paused(browser_page)
     browser_page.keyboard.press("Home")
     assert browser_page.inner_text("#doing") == "The robot grasps slice 1"
     browser_page.keyboard.press("n")
@@ -223,15 +224,14 @@ def test_keys_go_from_move_to_move_and_the_words_the_chart_and_the_slider_follow
 
 
 def test_a_schedule_is_pale_where_it_is_still_to_come_and_its_bars_are_called_as_its_parts(
-    browser_page: "Page", tmp_path: Path, until: Until
+    browser_page: "Page", tmp_path: Path, paused: Paused
 ) -> None:
     (tmp_path / "plan.csv").write_text("job,machine,start,end\norder 7,saw,0,30\norder 8,mill,10,40\n,saw,30,35\n")
     scene = scene_of(read_schedule([tmp_path / "plan.csv"]), "plan")
     page = replay_html(scene.recording, tmp_path / "plan.html", 1, scene.title, scene.story, tracks=scene.tracks)
     browser_page.set_viewport_size({"width": 700, "height": 400})
     browser_page.goto(page.as_uri())
-    until(browser_page, "player.state().playing")
-    browser_page.keyboard.press(" ")
+    paused(browser_page)
     browser_page.evaluate("(() => { const at = document.getElementById('seek'); at.value = 20; at.oninput(); })()")
     assert pose_of(browser_page, "part 1")[2] == pytest.approx(HIGH_M + PART_M / 2)
     assert browser_page.inner_text("#doing") == "order 8 begins in mill"

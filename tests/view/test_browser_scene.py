@@ -63,7 +63,7 @@ def test_the_live_page_shows_the_arm_and_the_slices(browser_page: "Page", scene:
 
 
 def test_the_replay_shows_the_arm_and_the_slices_offline(
-    browser_page: "Page", scene: Scene, tmp_path: Path, until: Until
+    browser_page: "Page", scene: Scene, tmp_path: Path, paused: Callable[["Page"], None]
 ) -> None:
     recorder = Recorder(scene.world)
     first = move(scene, ABOVE_THE_PLATE[0], recorder)
@@ -74,8 +74,7 @@ def test_the_replay_shows_the_arm_and_the_slices_offline(
     browser_page.context.set_offline(True)
     page = replay_html(recorder.recording, tmp_path / "replay.html", speed=0.5).as_uri()
     browser_page.goto(page)
-    until(browser_page, "player.state().playing")
-    browser_page.click("#play")  # pauses
+    paused(browser_page)
     for key, expected in (("Home", first), ("End", last)):
         browser_page.keyboard.press(key)
         assert on_page(browser_page, expected)
