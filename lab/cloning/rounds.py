@@ -186,6 +186,10 @@ def _mentor(
     )
     if options.rule in UNCALIBRATED:
         return Mentor.learn(recording, options.rule, seed=options.seed)
+    if options.rule in ("random", "clock"):
+        mentor, often = Mentor.learn(recording, options.rule, seed=options.seed), options.every_steps
+        mentor.threshold = 1.0 - 1.0 / often if options.rule == "random" else often - 1.5  # the clock counts from 0
+        return mentor
     seeds = seeds_for(options, CALIBRATING, options.calibrated, number)
     rollouts = [student.planned(roll_out(student, seed)) for seed in seeds]
     learned, others = parted(options.rule, rollouts)
@@ -193,10 +197,6 @@ def _mentor(
         mentor = Mentor.learn(recording, options.rule, rollouts=learned, seed=options.seed)
     except BadInput:  # the failure predictor, when all rollouts or none failed
         mentor = Mentor.learn(recording, "distance", seed=options.seed)
-    if options.rule in ("random", "clock"):
-        often = options.every_steps
-        mentor.threshold = 1.0 - 1.0 / often if options.rule == "random" else often - 1.5  # the clock counts from 0
-        return mentor
     well = [episode for episode in others if episode.success]
     if (len(well) + 1) * options.false_alarms >= 1.0:
         return mentor.calibrate(others, false_alarms=options.false_alarms)

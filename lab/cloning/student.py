@@ -1,7 +1,6 @@
 """`Student`: a small policy that is cloned from demonstrations and corrections (behaviour cloning, by scikit-learn)."""
 
 import json
-import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -22,7 +21,8 @@ from lab.toolbox.policy_file import header_of, ordered
 
 FORMAT = "teaching-lab student 1"
 MOST_BYTES = 50_000_000  # of a student's file
-HIDDEN = (128, 128)  # units of its layers
+NETWORKS = 3  # whose mean it is; one alone depends much on its seed
+HIDDEN = (128, 128)  # units of their layers
 CHUNK = 4  # actions that it plans at each step
 EPOCHS, BATCH = 400, 256
 _STILL = 1e-6  # standard deviation below which a number is the same in all steps
@@ -32,9 +32,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Student:
-    """A multilayer perceptron (ReLU) from a state (d,) to a chunk of actions (h, k); a call returns the first of them (k,).
+    """The mean of m multilayer perceptrons (ReLU), from a state (d,) to a chunk of actions (h, k); a call returns the first (k,).
 
-    middle, scale (d,): of the states; weights, biases: of each layer; chunk: h. Acting takes NumPy alone, learning scikit-learn.
+    middle, scale (d,): of the states; weights (m, i, o), biases (m, o): of each layer; chunk: h. Acting takes NumPy alone,
+    learning scikit-learn.
     """
 
     middle: Array
@@ -63,25 +64,22 @@ class Student:
             raise BadInput("student: no step of a demonstration that did not fail: wanted one or more")
         middle, spread = states.mean(axis=0), states.std(axis=0)
         scale = np.where(spread > _STILL, spread, 1.0)
-        network = sklearn.neural_network.MLPRegressor(
-            hidden_layer_sizes=HIDDEN,
-            batch_size=min(BATCH, len(states)),
-            max_iter=epochs,
-            random_state=seed,
-            n_iter_no_change=epochs,
-        )
-        with warnings.catch_warnings(), threadpoolctl.threadpool_limits(1):  # the same sums on any number of cores
-            warnings.simplefilter("ignore", sklearn.exceptions.ConvergenceWarning)  # it stops after so many epochs
-            network.fit((states - middle) / scale, chunks.reshape(len(chunks), -1))
-        return cls(middle, scale, [*network.coefs_], [*network.intercepts_])
+        inputs = ((states - middle) / scale).astype(np.float32)
+        targets = chunks.reshape(len(chunks), -1).astype(np.float32)
+        with threadpoolctl.threadpool_limits(1):  # the same sums on any number of cores
+            networks = [_network(inputs, targets, [seed, number], epochs) for number in range(NETWORKS)]
+        layers = [np.stack(layer) for layer in zip(*networks, strict=True)]
+        return cls(middle, scale, layers[: len(HIDDEN) + 1], layers[len(HIDDEN) + 1 :])
 
     def plan(self, states: Any) -> Array:
         """The actions (..., h, k) that it would take from states (..., d) on."""
-        values = (np.asarray(states, np.float64) - self.middle) / self.scale
-        for weights, biases in zip(self.weights[:-1], self.biases[:-1], strict=True):
-            values = np.maximum(values @ weights + biases, 0.0)
-        values = values @ self.weights[-1] + self.biases[-1]
-        return np.asarray(values.reshape(*values.shape[:-1], self.chunk, -1))
+        states = np.asarray(states, np.float64)
+        values = (states.reshape(-1, len(self.middle)) - self.middle) / self.scale
+        for layer, (weights, biases) in enumerate(zip(self.weights, self.biases, strict=True)):
+            values = values @ weights + biases[:, None]  # (m, n, o)
+            if layer < len(self.weights) - 1:
+                values = np.maximum(values, 0.0)
+        return np.asarray(values.mean(axis=0).reshape(*states.shape[:-1], self.chunk, -1))
 
     def __call__(self, state: Any) -> NDArray[np.float32]:
         """The action (k,) in a state (d,), each number from -1 to 1."""
@@ -131,8 +129,28 @@ class Student:
             [tensors[f"biases {number}"] for number in range(layers)],
             chunk,
         )
+        if any(array.ndim != 3 for array in student.weights) or any(array.ndim != 2 for array in student.biases):
+            raise ValueError("weights other than of three axes, or biases other than of two")
         student(np.zeros(len(student.middle)))  # shapes that do not fit raise ValueError
         return student
+
+
+def _network(inputs: Any, targets: Any, seed: Sequence[int], epochs: int) -> list[Array]:
+    """The weights of each layer of a network that learned, then the biases: their means over the last half of the epochs.
+
+    Averaging evens out what the last steps of a constant rate leave to chance (Izmailov and others 2018, "Averaging Weights
+    Leads to Wider Optima and Better Generalization").
+    """
+    drawn = int(np.random.default_rng(seed).integers(2**31))
+    network = sklearn.neural_network.MLPRegressor(hidden_layer_sizes=HIDDEN, batch_size=min(BATCH, len(inputs)), random_state=drawn)
+    first = epochs // 2
+    means: list[Array] = []
+    for epoch in range(epochs):
+        network.partial_fit(inputs, targets)
+        if epoch >= first:
+            now = [array.astype(np.float64) for array in (*network.coefs_, *network.intercepts_)]
+            means = [mean + (array - mean) / (epoch - first + 1) for mean, array in zip(means or now, now, strict=True)]
+    return means
 
 
 def _pairs(shown: Iterable[tuple[Episode, NDArray[np.bool_]]]) -> tuple[Array, Array]:

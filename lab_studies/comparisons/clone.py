@@ -19,10 +19,10 @@ from lab.view.canvas import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, RED, SKY, pi
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SKILLS = ("grasp", "place", "insert")
+SECONDS = {"grasp": 6.0, "place": 6.0, "transfer": 14.0}  # of an episode; the teacher takes half of that or less
 DOUBTING = ("distance", "discrepancy", "ensemble", "chunk", "progress", "failure")
 RIVALS = ("random", "clock", "always", "never")
-OPTIONS = CloningOptions(rounds=3, questions=12, calibrated=15, evaluated=20, false_alarms=0.2)
+OPTIONS = CloningOptions(rounds=2, questions=10, calibrated=12, evaluated=30, false_alarms=0.2)
 NOISE = 0.1  # of each action, as a share of the commanded velocity
 GOAL = 0.9  # the share of successes whose questions are counted
 MEASURES = (
@@ -53,7 +53,7 @@ def clone(job: Job, reading: Mapping[str, Any]) -> Findings:
     """The results of every rule and skill; a session is a seed, and the reading has no effect."""
     sessions = [
         Session(skill, int(seed % 2**31))
-        for skill in SKILLS
+        for skill in SECONDS
         for seed in seeds_of(_Skill(skill), job.sessions, job.seed)
     ]
     done: dict[Session, Results] = job.kept_as(_kept)
@@ -65,18 +65,18 @@ def clone(job: Job, reading: Mapping[str, Any]) -> Findings:
         job.progress(len(done), len(sessions))
     rows = [
         one
-        for skill in SKILLS
+        for skill in SECONDS
         for one in rows_of(skill, [done[session] for session in sessions if session.skill == skill])
     ]
     says: Row = {}
-    for skill in SKILLS:
+    for skill in SECONDS:
         for rule in (*DOUBTING, "clock"):
             (gain,) = those(rows, skill=skill, rule=rule, round=OPTIONS.rounds, measure="gain_percent")
             low, high = gain["ci95"]
             says[f"{skill}: {rule} over random at equal questions [points of success]"] = (
                 f"{gain['value']:.1f} ({low:.1f} to {high:.1f})"
             )
-    pictures = {f"Success against questions, {skill}": _picture(those(rows, skill=skill)) for skill in SKILLS}
+    pictures = {f"Success against questions, {skill}": _picture(those(rows, skill=skill)) for skill in SECONDS}
     return Findings(rows, says, pictures, (MEASURES.format(**asdict(OPTIONS)),))
 
 
@@ -94,7 +94,7 @@ def _kept(record: Any) -> tuple[Session, Results]:
 
 def results_of(session: Session) -> Results:
     """The measurements of every rule in a session in physics."""
-    problem = SkillProblem("toast", session.skill, NOISE)
+    problem = SkillProblem("toast", session.skill, NOISE, SECONDS[session.skill])
     options = replace(OPTIONS, seed=session.seed)
     try:
         return rules_tried(problem, problem.demonstrated(options), options)

@@ -32,6 +32,19 @@ def test_a_chunk_ends_with_its_stretch() -> None:
     assert chunks[:, :, 0].tolist() == [[1, 2, 2, 2], [2, 2, 2, 2], [4, 5, 5, 5], [5, 5, 5, 5]]
 
 
+def test_a_plan_is_the_mean_of_the_networks() -> None:
+    weights = np.array([[[1.0, 2.0]], [[3.0, 6.0]]])  # of two networks, from one number to two actions
+    student = Student(np.array([5.0]), np.array([2.0]), [weights], [np.array([[0.0, 1.0], [0.0, 3.0]])], chunk=2)
+    assert student.plan([7.0]).tolist() == [[2.0], [6.0]]  # (7 - 5) / 2 = 1
+    assert student.plan([[[7.0], [9.0]]])[0, 1].tolist() == [[4.0], [10.0]]
+
+
+def test_a_file_of_other_axes_is_refused(tmp_path: Path) -> None:
+    Student(np.zeros(1), np.ones(1), [np.ones((1, CHUNK))], [np.zeros(CHUNK)]).save(tmp_path / "student")
+    with pytest.raises(BadInput, match="axes"):
+        Student.load(tmp_path / "student")
+
+
 def test_it_does_as_was_demonstrated_and_corrected(roll_out: RollOut, shown: Recording) -> None:
     student = Student.learn(shown, seed=1)
     assert student([0.3])[0] > 0.9
@@ -69,8 +82,8 @@ def test_a_file_gives_the_student_back(shown: Recording, tmp_path: Path) -> None
 @settings(max_examples=60, deadline=None)
 @given(st.integers(0, 1199), st.integers(0, 255))
 def test_a_damaged_file_is_refused_or_harmless(at: int, value: int) -> None:
-    layer = np.full((1, CHUNK), 0.5)
-    student = Student(np.zeros(1), np.ones(1), [layer], [np.zeros(CHUNK)])
+    layer = np.full((1, 1, CHUNK), 0.5)
+    student = Student(np.zeros(1), np.ones(1), [layer], [np.zeros((1, CHUNK))])
     import tempfile
 
     with tempfile.TemporaryDirectory() as folder:
