@@ -141,8 +141,10 @@ def _network(inputs: Any, targets: Any, seed: Sequence[int], epochs: int) -> lis
     Averaging evens out what the last steps of a constant rate leave to chance (Izmailov and others 2018, "Averaging Weights
     Leads to Wider Optima and Better Generalization").
     """
-    drawn = int(np.random.default_rng(seed).integers(2**31))
-    network = sklearn.neural_network.MLPRegressor(hidden_layer_sizes=HIDDEN, batch_size=min(BATCH, len(inputs)), random_state=drawn)
+    rng = np.random.default_rng(seed)
+    network = sklearn.neural_network.MLPRegressor(
+        hidden_layer_sizes=HIDDEN, batch_size=min(BATCH, len(inputs)), random_state=int(rng.integers(2**31))
+    )
     first = epochs // 2
     means: list[Array] = []
     for epoch in range(epochs):
