@@ -19,15 +19,19 @@ from lab.view.canvas import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, RED, SKY, pi
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SECONDS = {"grasp": 6.0, "place": 6.0, "transfer": 14.0}  # of an episode; the teacher takes half of that or less
+SKILLS = {
+    "grasp": 6.0,
+    "place": 6.0,
+    "transfer": 14.0,
+}  # the seconds until an episode is cut; the teacher takes about half
 DOUBTING = ("distance", "discrepancy", "ensemble", "chunk", "progress", "failure")
 RIVALS = ("random", "clock", "always", "never")
 OPTIONS = CloningOptions(rounds=2, questions=10, calibrated=12, evaluated=30, false_alarms=0.2)
 NOISE = 0.1  # of each action, as a share of the commanded velocity
 GOAL = 0.9  # the share of successes whose questions are counted
 MEASURES = (
-    "A student is cloned from {demonstrations} demonstrations of a skill. In each of {rounds} rounds it may ask "
-    "{questions} times; the scripted teacher then takes over for {takeover_steps} steps of 0.1 s, and the student learns "
+    "A student is cloned from {demonstrations} demonstrations of a skill, whose episodes are cut after {seconds}. In each "
+    "of {rounds} rounds it may ask {questions} times; the scripted teacher then takes over for {takeover_steps} steps of 0.1 s, and the student learns "
     "the corrections. success_percent: of {evaluated} episodes without a teacher, the same after each round and in "
     "nothing else used. questions: so far. gain_percent: success_percent above what asking at random reaches with as many"
     " questions in the same session (interpolated linearly). warned_percent: failures in which the rule would have asked;"
@@ -53,7 +57,7 @@ def clone(job: Job, reading: Mapping[str, Any]) -> Findings:
     """The results of every rule and skill; a session is a seed, and the reading has no effect."""
     sessions = [
         Session(skill, int(seed % 2**31))
-        for skill in SECONDS
+        for skill in SKILLS
         for seed in seeds_of(_Skill(skill), job.sessions, job.seed)
     ]
     done: dict[Session, Results] = job.kept_as(_kept)
@@ -65,19 +69,20 @@ def clone(job: Job, reading: Mapping[str, Any]) -> Findings:
         job.progress(len(done), len(sessions))
     rows = [
         one
-        for skill in SECONDS
+        for skill in SKILLS
         for one in rows_of(skill, [done[session] for session in sessions if session.skill == skill])
     ]
     says: Row = {}
-    for skill in SECONDS:
+    for skill in SKILLS:
         for rule in (*DOUBTING, "clock"):
             (gain,) = those(rows, skill=skill, rule=rule, round=OPTIONS.rounds, measure="gain_percent")
             low, high = gain["ci95"]
             says[f"{skill}: {rule} over random at equal questions [points of success]"] = (
                 f"{gain['value']:.1f} ({low:.1f} to {high:.1f})"
             )
-    pictures = {f"Success against questions, {skill}": _picture(those(rows, skill=skill)) for skill in SECONDS}
-    return Findings(rows, says, pictures, (MEASURES.format(**asdict(OPTIONS)),))
+    limits = ", ".join(f"{seconds:g} s ({skill})" for skill, seconds in SKILLS.items())
+    pictures = {f"Success against questions, {skill}": _picture(those(rows, skill=skill)) for skill in SKILLS}
+    return Findings(rows, says, pictures, (MEASURES.format(**asdict(OPTIONS), seconds=limits),))
 
 
 @dataclass(frozen=True)
@@ -94,7 +99,7 @@ def _kept(record: Any) -> tuple[Session, Results]:
 
 def results_of(session: Session) -> Results:
     """The measurements of every rule in a session in physics."""
-    problem = SkillProblem("toast", session.skill, NOISE, SECONDS[session.skill])
+    problem = SkillProblem("toast", session.skill, NOISE, SKILLS[session.skill])
     options = replace(OPTIONS, seed=session.seed)
     try:
         return rules_tried(problem, problem.demonstrated(options), options)
