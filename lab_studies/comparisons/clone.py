@@ -30,14 +30,15 @@ OPTIONS = CloningOptions(rounds=2, questions=10, calibrated=12, evaluated=30, fa
 NOISE = 0.1  # of each action, as a share of the commanded velocity
 GOAL = 0.9  # the share of successes whose questions are counted
 MEASURES = (
-    "A student is cloned from {demonstrations} demonstrations of a skill, whose episodes are cut after {seconds}. In each "
-    "of {rounds} rounds it may ask {questions} times; the scripted teacher then takes over for {takeover_steps} steps "
-    "of 0.1 s, and the student learns the corrections. success_percent: of {evaluated} episodes without a teacher, the same after each round and in "
-    "nothing else used. questions: so far. gain_percent: success_percent above what asking at random reaches with as many"
-    " questions in the same session (interpolated linearly). warned_percent: failures in which the rule would have asked;"
-    " false_alarms_percent: successes in which it would have asked, of which {false_alarms:.0%} were allowed, where the "
-    "threshold was promised. lead_s: from the first question to the end of a failed episode. questions_to_90: until a "
-    "round reaches 90 %; a session that does not counts with all its questions and one more."
+    "A student is cloned from {demonstrations} demonstrations of a skill, whose episodes are cut after {seconds}. In "
+    "each of {rounds} rounds it may ask {questions} times; the scripted teacher then takes over for {takeover_steps} "
+    "steps of 0.1 s, and the student learns the corrections. success_percent: of {evaluated} episodes without a "
+    "teacher, the same after each round and in nothing else used. questions: so far. gain_percent: success_percent "
+    "above what asking at random reaches with as many questions in the same session (interpolated linearly). "
+    "warned_percent: failures in which the rule would have asked; false_alarms_percent: successes in which it would "
+    "have asked, of which {false_alarms:.0%} were allowed, where the threshold was promised. lead_s: from the first "
+    "question to the end of a failed episode. questions_to_90: until a round reaches 90 %; a session that does not "
+    "counts with all its questions and one more."
 )
 
 
