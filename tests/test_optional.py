@@ -185,6 +185,7 @@ def test_too_little_memory_is_not_taken_for_a_missing_library() -> None:
 # ---- all of them at once ------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_without_all_that_is_not_plain_toast_is_made_and_its_times_are_kept(without: Without) -> None:
     """The second run learns nothing and times nothing."""
     hidden = not_plain()

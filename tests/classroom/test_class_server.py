@@ -221,6 +221,7 @@ def test_a_finished_lesson_is_a_row_of_the_table_and_is_shown_again(server: Clas
         assert again.call(lambda: [row["state"] for row in again.room.rows()]) == ["over"]
 
 
+@pytest.mark.slow
 def test_a_lesson_that_ended_as_its_desk_was_killed_is_made_again_from_its_journal(server: ClassServer) -> None:
     page = join(server)["page"]
     at_page(server, page, taught)

@@ -70,6 +70,7 @@ async def _answered(page: ClientConnection, answers: int | None) -> None:
         asks = news["seat"]["question"]
 
 
+@pytest.mark.slow
 def test_an_order_at_a_desk_is_the_order_alone_also_after_the_desk_was_killed(tmp_path: Path) -> None:
     """The journal is the same byte for byte: at one go, and killed and closed in the middle."""
     document = alone(tmp_path / "alone")

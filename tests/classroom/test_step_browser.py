@@ -22,6 +22,7 @@ def server(tmp_path: Path) -> Iterator[ClassServer]:
         yield running
 
 
+@pytest.mark.slow
 def test_from_the_consent_to_the_withdrawal(server: ClassServer, browser_page: "Page") -> None:
     page = browser_page
     page.goto(server.join_url)
@@ -48,6 +49,7 @@ def test_from_the_consent_to_the_withdrawal(server: ClassServer, browser_page: "
     page.wait_for_selector("#text:has-text('Nobody takes part')")
 
 
+@pytest.mark.slow
 def test_a_lesson_whose_time_is_up_offers_to_go_on(tmp_path: Path, browser_page: "Page") -> None:
     changed = {
         "time_limit_s = 1\n": "",

@@ -40,6 +40,7 @@ def files(server: ClassServer) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
+@pytest.mark.slow
 def test_participants_go_through_all_arms_and_one_withdraws(server: ClassServer) -> None:
     people = [Scripted.joined(server) for _ in range(4)]
     for person in people[:3]:
@@ -92,6 +93,7 @@ def test_a_study_with_a_withdrawal_ends_and_goes_on_without_a_trace(server: Clas
         assert not any(b"P02" in content or "P02" in name for name, content in files(server).items())
 
 
+@pytest.mark.slow
 def test_nothing_comes_back_of_lessons_that_were_just_taught(tmp_path: Path) -> None:
     """The desks of two lessons may still draw their pictures when the participant withdraws."""
     text = 'lessons = ["small.txt"]\ngate = "always"\nepisodes = 2\n\n[[arms]]\nname = "b"'

@@ -114,7 +114,7 @@ def test_only_the_pupil_whose_turn_it_is_operates_and_anybody_stops(server: Clas
         }
         assert second.told["turn"]["yours"] is False
         await first.command("jog +z 20")
-        await second.say({"command": "home"})
+        await second.say({"command": "jog +x 20"})
         await second.sees(lambda at: f"{names[0]}'s turn" in at.refusal)
         await second.say({"seat": "take"})
         await second.sees(lambda at: f"{names[0]}'s turn" in at.refusal)
@@ -129,6 +129,7 @@ def test_only_the_pupil_whose_turn_it_is_operates_and_anybody_stops(server: Clas
     assert lines == [{"pupil": 1, "command": "jog +z 20"}, {"pupil": 2, "command": "stop"}]
 
 
+@pytest.mark.slow
 def test_the_turn_passes_by_handing_over_and_by_the_teacher(server: ClassServer) -> None:
     pages = [join(server)["page"] for _ in range(3)]
 
@@ -142,12 +143,13 @@ def test_the_turn_passes_by_handing_over_and_by_the_teacher(server: ClassServer)
         await asyncio.to_thread(server.call, lambda: room(server).give_turn(1))
         await first.sees(lambda at: at.told["turn"]["yours"])
         await first.operates()
-        await first.command("home")
+        await first.command("jog +x 20")
 
     at_pages(server, pages, operate, begins=True)
     assert {number: tile["commands"] for number, tile in server.call(room(server).tiles).items()} == {1: 1, 2: 1, 3: 0}
 
 
+@pytest.mark.slow
 def test_a_turn_ends_with_its_time(roster: Roster) -> None:
     roster.turn_s = 0.5
     with ClassServer(roster, Place()) as server:
@@ -161,6 +163,7 @@ def test_a_turn_ends_with_its_time(roster: Roster) -> None:
     assert Roster.read(roster.folder).turn_s == 0.5
 
 
+@pytest.mark.slow
 def test_the_turn_of_a_pupil_who_has_gone_passes_on(server: ClassServer, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(turn_room, "AWAY_S", 0.01)
     pages = [join(server)["page"] for _ in range(2)]
@@ -177,6 +180,7 @@ def test_the_turn_of_a_pupil_who_has_gone_passes_on(server: ClassServer, monkeyp
     at_pages(server, pages[1:], operate, begins=True)
 
 
+@pytest.mark.slow
 def test_a_killed_server_goes_on_with_the_run(server: ClassServer, roster: Roster) -> None:
     pages = [join(server)["page"] for _ in range(2)]
 
@@ -189,7 +193,7 @@ def test_a_killed_server_goes_on_with_the_run(server: ClassServer, roster: Roste
         assert first.done == ["jog +z 20"]
         await first.say(HAND_OVER)
         await second.operates()
-        await second.command("home")
+        await second.command("jog +x 20")
         await asyncio.to_thread(server.call, room(server).finish)
         await second.sees(lambda at: at.seat.get("ended"))
 
@@ -208,7 +212,7 @@ def test_a_killed_server_goes_on_with_the_run(server: ClassServer, roster: Roste
         (pupil.name, 0, 1, False, 1) for pupil in roster.pupils
     ]
     _, entries, _ = read_run(roster.folder / RUN, "test")
-    assert [entry.words for entry in entries if isinstance(entry, Commanded)] == ["jog +z 20", "home"]
+    assert [entry.words for entry in entries if isinstance(entry, Commanded)] == ["jog +z 20", "jog +x 20"]
     assert write_report(Roster.read(roster.folder))["rows"] == rows
     assert (roster.folder / "class.csv").read_text().splitlines() == [
         "pupil,name,lesson,skill,state,solved,delivered,parts,commands",

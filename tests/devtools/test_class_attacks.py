@@ -16,7 +16,6 @@ QUIET = Taught(0, {"Ada": "1", "Emmy": "2"}, SAID, 0.02, 0.05, 90.0, 80.0, 700.0
 
 
 @pytest.mark.slow
-@pytest.mark.slow
 def test_a_class_does_not_notice_requests_without_a_right(tmp_path: Path, root: Path) -> None:
     words = ["class", "--count", "1", "--workers", "1", "--out", str(tmp_path)]
     ended = subprocess.run(

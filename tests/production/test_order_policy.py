@@ -25,6 +25,7 @@ def asked(lab: Lab, words: str) -> dict[str, Any]:
     return document
 
 
+@pytest.mark.slow
 def test_a_policy_is_kept_by_name_and_decides_in_another_cell(lab: Lab, folder: Path) -> None:
     learned = asked(lab, f"{LEARN} --keep-policy toasts --toolbox box")
     assert Path(learned["policy_kept"]).is_relative_to(folder / "box") or learned["policy_kept"].startswith("box")

@@ -24,6 +24,7 @@ def mill_and_washer(lab: Lab, folder: Path) -> Path:
     return file
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("fault", "code", "delivered"),
     [('"machine slow"\nshare = 1.9', 0, ["plate 1", "cup 2"]), ('"machine fails"', 1, ["cup 2"])],
@@ -75,6 +76,7 @@ def test_a_part_that_was_moved_while_the_robot_served_it_is_served_again(lab: La
     assert fault["answer"] == "puts it back"
 
 
+@pytest.mark.slow
 def test_a_part_that_gets_another_target_on_the_way_left_when_it_was_taken_up(lab: Lab, folder: Path) -> None:
     """Plate 2 is on its way to the buffer when plate 1 is taken out of the mill: now it can go there at once."""
     kinds = ("--part", "plate=box:0.05x0.03x0.04:2", "--machine", "mill:40", "--buffer")

@@ -48,6 +48,7 @@ def test_a_lid_is_put_on_its_box(root: Path, tmp_path: Path) -> None:
     assert last["lid 1"][2] == pytest.approx(last["box 2"][2] + 0.025 + 0.01, abs=0.003)  # half a box and half a lid
 
 
+@pytest.mark.slow
 def test_a_layer_is_taken_off_before_the_one_below(root: Path, tmp_path: Path) -> None:
     text = (root / "tasks" / "palletise.toml").read_text(encoding="utf-8")
     for old, new in (

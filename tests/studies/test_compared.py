@@ -212,6 +212,7 @@ RATE, ANSWER = 0.5, 3
 """
 
 
+@pytest.mark.slow
 def test_own_code_that_was_edited_is_run_again(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(OWN)
     (tmp_path / "helping.py").write_text("SHARE = 2\n")

@@ -144,6 +144,7 @@ def test_a_slice_goes_into_a_toaster_that_was_pushed(after: Any, two_toasts: Any
     assert hypot(x - 0.995, y - 0.175) < 0.004
 
 
+@pytest.mark.slow
 def test_a_wall_around_a_station_blocks_its_ways_and_says_so(
     after: Any, two_toasts: Any, spots: Any, teacher: Teacher
 ) -> None:

@@ -29,6 +29,7 @@ def run_with(two_toasts: tuple[Prepared, Taught], teacher: Teacher) -> Any:
     return run
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "fault",
     [
@@ -66,6 +67,7 @@ def test_what_cannot_be_made_is_left_and_said(
     assert outcome.verdict(NAMES).came == "stopped"
 
 
+@pytest.mark.slow
 def test_what_nobody_saw_is_said(run_with: Any) -> None:
     """While the camera is covered a slice is taken out of the toaster, too soon: it is not found blindly, and not passed off."""
     outcome = run_with(
@@ -80,6 +82,7 @@ def test_what_nobody_saw_is_said(run_with: Any) -> None:
     assert outcome.verdict(NAMES).unexplained == ()
 
 
+@pytest.mark.slow
 def test_the_schedule_says_how_long_a_slow_machine_took(run_with: Any) -> None:
     outcome = run_with({"what": "machine slow", "station": "toaster", "share": 1.5})
     toasted = [
@@ -92,6 +95,7 @@ def test_the_schedule_says_how_long_a_slow_machine_took(run_with: Any) -> None:
     assert outcome.audit.findings == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("station", "at_s"), [("toaster", 5), ("toaster", 78), ("butter_applier", 81)])
 def test_what_cannot_be_brought_on_is_set_down_and_goes_on_when_the_way_is_free(
     run_with: Any, station: str, at_s: float

@@ -51,6 +51,7 @@ def test_somebody_attends_it_as_long_as_a_page_is_open(desk: RunDesk) -> None:
     assert attended == [False, True, False]
 
 
+@pytest.mark.slow
 def test_what_is_said_while_it_moves_and_while_it_waits_is_in_the_journal(
     brisk: Task, toolbox: Toolbox, tmp_path: Path
 ) -> None:

@@ -117,6 +117,7 @@ def test_pressing_on_the_table_is_stopped_and_may_be_jogged_away(made: Made) -> 
 # ---- a plan and its run ----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_typed_order_is_checked_and_carried_out(made: Made, heard: list[Event]) -> None:
     operation = made(2)
     operation.open()

@@ -171,6 +171,7 @@ def test_ctrl_d_ends_advice_only(terminal: Callable[..., Terminal]) -> None:
     assert "No more answers: the learner goes on alone." in teacher.screen
 
 
+@pytest.mark.slow
 def test_a_run_asks_with_the_bar_out_of_the_way(terminal: Callable[..., Terminal], tmp_path: Path) -> None:
     run = terminal("run", "toast", "--toasts", "1", "--advisor", "terminal")
     for _ in range(2):

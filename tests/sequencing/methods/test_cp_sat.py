@@ -57,6 +57,7 @@ def test_random_cells(
     assert simulate(cell, found.sequence).makespan_s == found.cost
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(data=st.data(), objective=st.sampled_from(sorted(OBJECTIVES)))
 def test_every_objective(
