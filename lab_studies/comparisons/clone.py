@@ -12,7 +12,7 @@ from lab.cloning.skill_problem import SkillProblem
 from lab.cloning.student import Student
 from lab.recordings.episode import Episode, Recording
 from lab.studies.charts import legend_below
-from lab.studies.findings import Findings, Row, mean_row, row, those
+from lab.studies.findings import Findings, Row, mean_row, row, share_row, those
 from lab.studies.runner import Job, seeds_of
 from lab.view.canvas import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, RED, SKY, picture_bytes
 
@@ -29,16 +29,19 @@ RIVALS = ("random", "clock", "always", "never")
 OPTIONS = CloningOptions(rounds=2, questions=10, calibrated=12, evaluated=30, false_alarms=0.2)
 NOISE = 0.1  # of each action, as a share of the commanded velocity
 GOAL = 0.9  # the share of successes whose questions are counted
+MOST = OPTIONS.rounds * OPTIONS.questions  # questions
 MEASURES = (
     "A student is cloned from {demonstrations} demonstrations of a skill, whose episodes are cut after {seconds}. In "
     "each of {rounds} rounds it may ask {questions} times; the scripted teacher then takes over for {takeover_steps} "
     "steps of 0.1 s, and the student learns the corrections. success_percent: of {evaluated} episodes without a "
     "teacher, the same after each round and in nothing else used. questions: so far. gain_percent: success_percent "
-    "above what asking at random reaches with as many questions in the same session (interpolated linearly). "
+    "above what a rival reaches in the same session with as many questions (interpolated linearly; after the same round "
+    "if the rival asked fewer). "
     "warned_percent: failures in which the rule would have asked; false_alarms_percent: successes in which it would "
     "have asked, of which {false_alarms:.0%} were allowed, where the threshold was promised. lead_s: from the first "
-    "question to the end of a failed episode. questions_to_90: until a round reaches 90 %; a session that does not "
-    "counts with all its questions and one more."
+    "question to the end of a failed episode. questions_to_90: until 90 % are reached for good, that is in this round and all "
+    "that follow; a session in which they are not counts with one question more than all rounds allow. "
+    "reached_90_percent: sessions in which they are."
 )
 
 
@@ -76,10 +79,10 @@ def clone(job: Job, reading: Mapping[str, Any]) -> Findings:
     says: Row = {}
     for skill in SKILLS:
         for rule in (*DOUBTING, "clock"):
-            (gain,) = those(rows, skill=skill, rule=rule, round=OPTIONS.rounds, measure="gain_percent")
-            low, high = gain["ci95"]
-            says[f"{skill}: {rule} over random at equal questions [points of success]"] = (
-                f"{gain['value']:.1f} ({low:.1f} to {high:.1f})"
+            last = {"skill": skill, "rule": rule, "round": OPTIONS.rounds, "measure": "gain_percent"}
+            says[f"{skill}: {rule} at equal questions [points of success]"] = ", ".join(
+                "{value:.1f} ({ci95[0]:.1f} to {ci95[1]:.1f}) over {against}".format_map(gain)
+                for gain in those(rows, **last)
             )
     limits = ", ".join(f"{seconds:g} s ({skill})" for skill, seconds in SKILLS.items())
     pictures = {f"Success against questions, {skill}": _picture(those(rows, skill=skill)) for skill in SKILLS}
@@ -144,18 +147,23 @@ def rows_of(skill: str, sessions: Sequence[Results]) -> list[Row]:
             measured = [results[rule][number] for results in sessions]
             rows.append(mean_row(named, "success_percent", [100.0 * one.success for one in measured]))
             rows.append(row(named, "questions", float(np.mean([one.questions for one in measured]))))
-            gains = [100.0 * _gain(results, rule, number) for results in sessions]
-            rows.append(mean_row(named, "gain_percent", gains))
+            for rival in RIVALS:
+                if rival != rule:
+                    gains = [100.0 * _gain(results[rule][number], results[rival]) for results in sessions]
+                    rows.append(mean_row(named | {"against": rival}, "gain_percent", gains))
             rows += _of_mentor(named, measured)
+        overall: Row = {"skill": skill, "rule": rule, "round": None}
         reached = [_questions_to(results[rule]) for results in sessions]
-        rows.append(mean_row({"skill": skill, "rule": rule, "round": None}, "questions_to_90", reached))
+        rows.append(mean_row(overall, "questions_to_90", [MOST + 1 if one is None else one for one in reached]))
+        rows.append(share_row(overall, "reached_90_percent", [one is not None for one in reached]))
     return rows
 
 
-def _gain(results: Results, rule: str, number: int) -> float:
-    """The success of a rule above that of asking at random with as many questions, in one session."""
-    by_chance, mine = results["random"], results[rule][number]
-    asked, reached = [one.questions for one in by_chance], [one.success for one in by_chance]
+def _gain(mine: Measured, rival: Sequence[Measured]) -> float:
+    """The success above that of a rival in the same session, with as many questions or after the same round."""
+    if rival[mine.round].questions <= mine.questions:
+        return mine.success - rival[mine.round].success
+    asked, reached = [one.questions for one in rival], [one.success for one in rival]
     return mine.success - float(np.interp(mine.questions, asked, reached))
 
 
@@ -176,9 +184,11 @@ def _of_mentor(named: Row, measured: Iterable[Measured]) -> list[Row]:
     return rows
 
 
-def _questions_to(measured: Sequence[Measured]) -> int:
-    """The questions until a round reached GOAL; one more than all if none did."""
-    return next((one.questions for one in measured if one.success >= GOAL), measured[-1].questions + 1)
+def _questions_to(measured: Sequence[Measured]) -> int | None:
+    """The questions until GOAL was reached for good; None if it was not."""
+    missed = [one.round for one in measured if one.success < GOAL]
+    first = missed[-1] + 1 if missed else 0
+    return measured[first].questions if first < len(measured) else None
 
 
 def _picture(rows: Sequence[Row]) -> bytes:

@@ -9,7 +9,7 @@ from lab.cloning.rounds import CloningOptions, Measured
 from lab.mentor.conformal import Promise
 from lab.recordings.episode import Recording
 from lab.studies.findings import those
-from lab_studies.comparisons.clone import DOUBTING, RIVALS, Results, rows_of, rules_tried
+from lab_studies.comparisons.clone import DOUBTING, MOST, RIVALS, Results, rows_of, rules_tried
 from tests.cloning.conftest import rolled_out, straight_on
 
 pytestmark = pytest.mark.studies
@@ -30,14 +30,28 @@ def session(random_end: int, distance_end: int) -> Results:
     return results
 
 
-def test_the_gain_is_over_random_asking_with_as_many_questions() -> None:
+def test_the_gain_is_over_a_rival_with_as_many_questions() -> None:
     rows = rows_of("grasp", [session(8, 9), session(6, 7)])
-    (gain,) = those(rows, rule="distance", round=1, measure="gain_percent")
+    (gain,) = those(rows, rule="distance", round=1, measure="gain_percent", against="random")
     assert gain["value"] == pytest.approx(100 * np.mean([0.9 - 0.6, 0.7 - 0.5]))
+    (gain,) = those(rows, rule="distance", round=1, measure="gain_percent", against="never")
+    assert gain["value"] == pytest.approx(100 * np.mean([0.9 - 0.4, 0.7 - 0.4]))
+    assert not those(rows, rule="never", measure="gain_percent", against="never")
     (success,) = those(rows, rule="distance", round=1, measure="success_percent")
     assert success["value"] == pytest.approx(80.0)
-    (reached,) = those(rows, rule="distance", measure="questions_to_90")
-    assert reached["value"] == pytest.approx(np.mean([5, 6]))
+
+
+@pytest.mark.parametrize(
+    ("succeeded", "questions", "reached"),
+    [((4, 9), 5, 100.0), ((9, 9), 0, 100.0), ((9, 4), MOST + 1, 0.0), ((4, 4), MOST + 1, 0.0)],
+)
+def test_90_percent_are_reached_for_good_or_not_at_all(
+    succeeded: tuple[int, int], questions: int, reached: float
+) -> None:
+    results = session(8, 9) | {"distance": [measured(0, succeeded[0], 0), measured(1, succeeded[1], 5)]}
+    rows = rows_of("grasp", [results, results])
+    assert those(rows, rule="distance", measure="questions_to_90")[0]["value"] == questions
+    assert those(rows, rule="distance", measure="reached_90_percent")[0]["value"] == reached
 
 
 def test_warnings_are_counted_over_failures_and_alarms_over_successes() -> None:
