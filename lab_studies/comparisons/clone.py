@@ -192,7 +192,7 @@ def _questions_to(measured: Sequence[Measured]) -> int | None:
 
 
 def _picture(rows: Sequence[Row]) -> bytes:
-    """A picture of success against questions, a line for each rule."""
+    """A picture of success against questions, a line for each rule but "always", whose questions are those of every step."""
     colours = (BLUE, ORANGE, GREEN, PURPLE, RED, SKY)
     looks = dict(zip(DOUBTING, colours, strict=True)) | {"random": INK, "clock": GREY}
 
@@ -209,6 +209,8 @@ def _picture(rows: Sequence[Row]) -> bytes:
             ]
             line = "o--" if rule in RIVALS else "o-"
             axes.plot(*zip(*at, strict=True), line, color=colour, label=rule, markersize=4, linewidth=1.3)
+        never = those(rows, rule="never", round=OPTIONS.rounds, measure="success_percent")[0]["value"]
+        axes.axhline(never, color=GREY, linestyle=":", linewidth=1.3, label="never, at the end")
         axes.set(xlabel="questions", ylabel="successful episodes [%]", xlim=(0, None), ylim=(0, 102))
         axes.grid()
         legend_below(figure)
