@@ -17,6 +17,7 @@ from lab.production.run_status import RunStatus
 from lab.tasks.task import Order, Task
 from lab.teaching.events import Event, OperatorActed, Tell
 
+LEFT_FIRST = "the operator left before its turn"
 AT_WORK = "the robot is at work: pause first"
 LISTEN_S = 0.2  # longest single wait, so that Ctrl-C is noticed
 WORDS = tuple(word for word, command in COMMANDS.items() if command.how == "at once")
@@ -66,6 +67,8 @@ class Desk:
         """Accepts a command; returns its result if it is known at once, else None."""
         try:
             said = spoken(line)
+            if said.word == "run" and self.busy == "run" and self._rests:
+                said = spoken("go")
             if said.how == "at once":
                 done = self.operation.at_once(said, by)
                 if said.word == "step" and not done.refused:
@@ -122,9 +125,11 @@ class Desk:
     def still(self) -> bool:
         """Whether nothing moves before the next command."""
         operation = self.operation
-        if operation.waiting:  # checked first, because a command that is taken from there causes motion
-            return False
-        return not self.busy or (operation.scene.resting and operation.controls.waits)
+        waiting = next(iter(operation.waiting.copy()), None)  # first, because a command taken from there causes motion
+        paused = bool(self.busy) and operation.scene.resting and operation.controls.waits
+        if waiting is not None:
+            return paused and waiting[0].how == "in turn"  # its turn comes when the operator goes on
+        return paused or not self.busy
 
     def _wake(self) -> None:
         with self._changed:
@@ -143,7 +148,11 @@ class Desk:
         except Left:
             pass
         finally:
-            self.busy, self.closed = "", True
+            self.closed, operation.scene.leaving = True, False  # nothing is left to abort
+            while operation.waiting:
+                said, by = operation.waiting.popleft()
+                operation.refuse(said.words, LEFT_FIRST, by)
+            self.busy = ""
             self._wake()
 
     def _following(self) -> tuple[Spoken, str] | None:

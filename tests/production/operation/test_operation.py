@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from lab.production.composer import Conditions
-from lab.production.operation.desk import AT_WORK, Desk
+from lab.production.operation.desk import AT_WORK, LEFT_FIRST, Desk
 from lab.production.operation.operation import Operation
 from lab.production.run_journal import Commanded, SkillKept, read_run
 from lab.sim.world import TIME_STEP
@@ -289,6 +289,27 @@ def test_a_step_is_one_move(desk: Desk, heard: list[Event]) -> None:
     desk.say("go")
     desk.settle()
     assert desk.now().finished == 1
+
+
+def test_run_goes_on_after_a_step(desk: Desk) -> None:
+    for line in ("step", "run"):
+        desk.say(line)
+        desk.settle()
+    assert desk.now().finished == 1
+    assert [done.words for done in desk.done[-2:]] == ["go", "run"]
+
+
+def test_whose_turn_did_not_come_is_said(desk: Desk) -> None:
+    """As from a pipe, whose next line is read when nothing moves."""
+    for line in ("step", "policy", "home"):
+        desk.say(line)
+        desk.settle()
+    desk.leave()
+    until(
+        lambda: (
+            [(done.words, done.refused) for done in desk.done[-2:]] == [("policy", LEFT_FIRST), ("home", LEFT_FIRST)]
+        )
+    )
 
 
 def test_what_was_done_is_done_again_bit_for_bit(desk: Desk, made: Made, tmp_path: Path) -> None:
