@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from lab.learning.requests import AdviceRequest, AdvisorLeft
     from lab.learning.updates import RuleUpdate, Update
     from lab.mdp import Rewards, TabularMDP, grid
+    from lab.mentor.doubts import Doubt
     from lab.mentor.mentor import Mentor
     from lab.recordings.episode import Episode, Recording
     from lab.sequencing.cell.cell import Cell
@@ -48,6 +49,7 @@ _FACE = {
     "lab.learning.requests": ("AdviceRequest", "AdvisorLeft"),
     "lab.learning.updates": ("RuleUpdate", "Update"),
     "lab.mdp": ("Rewards", "TabularMDP", "grid"),
+    "lab.mentor.doubts": ("Doubt",),
     "lab.mentor.mentor": ("Mentor",),
     "lab.recordings.episode": ("Episode", "Recording"),
     "lab.sequencing.cell.cell": ("Cell",),
@@ -62,6 +64,7 @@ __all__ = [
     "AdvisorLeft",
     "BadInput",
     "Cell",
+    "Doubt",
     "Episode",
     "FoundSubtasks",
     "Gate",

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from lab.cli import deferred
-from lab.cli.families import offers
+from lab.cli.families import from_files, offers
 from lab.cli.options import Json, Port
 from lab.cli.output import console, show
 from lab.errors import BadInput, counted, unknown
@@ -43,7 +43,12 @@ def clone(
     ] = None,
     rule: Annotated[
         str | None,
-        typer.Option("--rule", help="When it asks: {doubts}; default: progress.", autocompletion=offers("doubts")),
+        typer.Option(
+            "--rule",
+            help="When it asks: {doubts}, or './mine.py:MyRule'; default: progress.",
+            autocompletion=offers("doubts"),
+            callback=from_files("doubts"),
+        ),
     ] = None,
     false_alarms: Annotated[
         float | None,
@@ -106,13 +111,15 @@ def clone(
         "seed": seed,
     }
     if resume is not None:
+        kept = deferred.cloning_options_of(resume)
         for name, value in (own | {"task": task, "noise": noise, "out": out}).items():
-            if value is not None:
+            if value is not None and not (
+                name == "rule" and value == kept.options.rule
+            ):  # from a file, it is named again
                 option = f"--{name.replace('_', '-')}"
                 raise BadInput(
                     f"{option} beside --resume: the session in '{resume}' goes on as it was begun; remove {option}"
                 )
-        kept = deferred.cloning_options_of(resume)
         if rounds is not None:
             kept = replace(kept, options=replace(kept.options, rounds=rounds))
     else:

@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from lab.learning.selection import SELECTIONS
     from lab.learning.settings import USUAL
     from lab.learning.updates import UPDATES
-    from lab.mentor.doubts import DOUBTS
+    from lab.mentor.doubts import DOUBTS, check_rule
     from lab.mentor.mentor import Mentor, parted
     from lab.mentor.takeovers import RULES, RulesCompared, rules_compared
     from lab.optional import require_extra
@@ -220,7 +220,7 @@ TABLE = {
     "lab.learning.selection": ("SELECTIONS",),
     "lab.learning.settings": ("USUAL",),
     "lab.learning.updates": ("UPDATES",),
-    "lab.mentor.doubts": ("DOUBTS",),
+    "lab.mentor.doubts": ("DOUBTS", "check_rule"),
     "lab.mentor.mentor": ("Mentor", "parted"),
     "lab.mentor.takeovers": ("RULES", "RulesCompared", "rules_compared"),
     "lab.optional": ("require_extra",),

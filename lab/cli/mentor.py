@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from lab.cli import deferred
-from lab.cli.families import offers
+from lab.cli.families import from_files, offers
 from lab.cli.options import Json, Seed
 from lab.cli.output import console, show
 from lab.errors import BadInput, counted, shortened
@@ -37,8 +37,9 @@ def mentor(
         str | None,
         typer.Option(
             "--rule",
-            help="For --keep, the measure of doubt: {doubts}; default: distance.",
+            help="For --keep, the measure of doubt: {doubts}; default: distance; without --keep, './mine.py:MyRule' to compare.",
             autocompletion=offers("doubts"),
+            callback=from_files("doubts"),
         ),
     ] = None,
     seed: Seed = 0,
@@ -50,8 +51,11 @@ def mentor(
     """
     if (keep is None) != (rollouts is None):
         raise BadInput("--keep and --rollouts: wanted both, or neither")
-    if keep is None and rule is not None:
-        raise BadInput(f"--rule {rule} without --keep: all rules are compared: remove --rule")
+    if keep is None and rule in deferred.RULES:
+        raise BadInput(f"--rule {rule} without --keep: it is among the rules that are compared: remove --rule")
+    if rule is not None:
+        deferred.check_rule(rule, "--rule")
+    rules = deferred.RULES if rule is None else (*deferred.RULES, rule)
     if keep is not None and report is not None:
         raise BadInput("--report beside --keep: a report compares rules: leave one of them away")
     for path, option in ((report, "--report"), (keep, "--keep")):
@@ -62,13 +66,14 @@ def mentor(
         show(_kept(recording, rollouts, keep, rule or "distance", false_alarms, seed), as_json, _kept_summary)
         return
     with deferred.counting(console(), "rules compared") as progress:
-        done = iter(range(len(deferred.RULES)))
+        done = iter(range(len(rules)))
         compared = deferred.rules_compared(
             recording,
+            rules=rules,
             window_s=window_s,
             false_alarms=false_alarms,
             seed=seed,
-            progress=lambda name: progress(next(done), len(deferred.RULES)),
+            progress=lambda name: progress(next(done), len(rules)),
         )
     document = deferred.report_document(compared) | {"report": None if report is None else str(report)}
     if report is not None:

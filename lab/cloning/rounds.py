@@ -9,9 +9,9 @@ from annotated_types import Ge, Gt, Lt
 from numpy.typing import NDArray
 
 from lab.cloning.student import EPOCHS, Student
-from lab.errors import BadInput, check_value, unknown
+from lab.errors import BadInput, check_value
 from lab.mentor.conformal import Promise
-from lab.mentor.doubts import DOUBTS, UNCALIBRATED
+from lab.mentor.doubts import UNCALIBRATED, check_rule
 from lab.mentor.mentor import Mentor, Question, parted
 from lab.recordings.episode import Episode, Recording
 
@@ -53,8 +53,7 @@ class CloningOptions:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if self.rule not in DOUBTS:
-            raise unknown("rule", self.rule, tuple(DOUBTS), "clone")
+        check_rule(self.rule, "clone")
         check_value("false_alarms", self.false_alarms, Annotated[float, Gt(0), Lt(1)], "clone")
         check_value("rounds", self.rounds, Annotated[int, Ge(0)], "clone")
         check_value("seed", self.seed, Annotated[int, Ge(0)], "clone")

@@ -1,17 +1,20 @@
-"""The measures of doubt that a mentor can go by, one class each, and their table DOUBTS."""
+"""The rules by which a mentor doubts, one class each, and their family DOUBTS."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar, Protocol
+from numbers import Real
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.errors import BadInput
+from lab.errors import BadInput, shortened, unknown
 from lab.lazy import scipy
 from lab.learning.members import Member
 from lab.mentor.demonstrated import Array, Demonstrated
+from lab.plugins.code_file import from_file
+from lab.plugins.family import Family, first_line, wanted
 from lab.recordings.episode import Episode
 
 NEIGHBOURS = 5
@@ -46,18 +49,21 @@ class Step:
         return float(self.demonstrated.left[self.near[1]].mean())
 
 
-class Doubt(Protocol):
-    """A measure of doubt: a number for each step of an episode; the mentor asks where it exceeds a threshold."""
+class Doubt:
+    """The base of the rules: a number for each step of an episode; a mentor asks where it is above a threshold.
 
-    def begin(self) -> None:
-        """An episode begins, or a teacher hands back."""
+    A rule of your own is a subclass with `__call__`, called once for each step, in order; `begin` is called before them. What it
+    learns stands in `arrays`, which is all that a file keeps of it. `lab.testing.check_doubt` holds it to the contract.
 
-    def __call__(self, step: Step) -> float:
-        """The doubt at a step; called once for each, in order."""
-
-
-class Measure:
-    """The base of the measures: what was learned of one stands in `arrays`, which is all that a file keeps of it."""
+        >>> import lab
+        >>> class Slow(lab.Doubt):
+        ...     "Asks where the action is small."
+        ...
+        ...     def __call__(self, step):
+        ...         return -abs(step.action).max()
+        >>> from lab.testing import check_doubt
+        >>> check_doubt(Slow)
+    """
 
     learns_from_rollouts: ClassVar[bool] = False  # which then calibrate nothing: in them it doubts less than in others
 
@@ -67,14 +73,18 @@ class Measure:
 
     @classmethod
     def learned(cls, demonstrated: Demonstrated, rollouts: Sequence[Episode], rng: np.random.Generator) -> Arrays:
-        """The arrays of the measure, learned from demonstrations and from rollouts whose success is known."""
+        """The arrays of the rule, of numbers of 64 bits, learned from demonstrations and from rollouts whose success is known."""
         return {}
 
     def begin(self) -> None:
         """An episode begins, or a teacher hands back."""
 
+    def __call__(self, step: Step) -> float:
+        """The doubt at a step."""
+        raise NotImplementedError
 
-class Distance(Measure):
+
+class Distance(Doubt):
     """The distance of the state to its fifth nearest demonstrated state, in standard deviations.
 
     Source: Sun et al. 2022, out-of-distribution detection with deep nearest neighbours.
@@ -84,7 +94,7 @@ class Distance(Measure):
         return float(step.near[0][-1])
 
 
-class Discrepancy(Measure):
+class Discrepancy(Doubt):
     """The distance of the action to the mean of the actions that were demonstrated nearby, in standard deviations.
 
     Source: SafeDAgger (Zhang and Cho 2017), with nearest neighbours in place of a learned classifier.
@@ -95,7 +105,7 @@ class Discrepancy(Measure):
         return float(np.linalg.norm((step.action - there) / self.demonstrated.action_scale))
 
 
-class Ensemble(Measure):
+class Ensemble(Doubt):
     """The standard deviation of the actions of an ensemble, in those of the demonstrations.
 
     It is the policy's own ensemble if the policy hands its members over; otherwise the mentor's, of ridge regressions on random
@@ -135,7 +145,7 @@ def _fourier(states: Array, frequencies: Array, phases: Array) -> Array:
     return np.asarray(np.cos(states @ frequencies + phases) * np.sqrt(2.0 / phases.shape[-1]))
 
 
-class ChunkDisagreement(Measure):
+class ChunkDisagreement(Doubt):
     """The distance between the chunk of actions that the policy plans now and what it planned for these steps before.
 
     The mean over the steps that both plan, in standard deviations of the demonstrated actions; 0 at the first step.
@@ -159,7 +169,7 @@ class ChunkDisagreement(Measure):
         return float(np.linalg.norm(apart, axis=1).mean())
 
 
-class NoProgress(Measure):
+class NoProgress(Doubt):
     """The number of steps since the end came nearer, by at least one step, than ever before in the episode.
 
     How far the end is, is told by the nearest demonstrated steps: the mean number of steps that they were from their ends.
@@ -176,7 +186,7 @@ class NoProgress(Measure):
         return float(self._stalled)
 
 
-class FailurePredictor(Measure):
+class FailurePredictor(Doubt):
     """The probability, by logistic regression, that a step belongs to a rollout that fails.
 
     It looks at the state, the other measures of doubt and the time; it is learned from rollouts of which some failed.
@@ -231,7 +241,7 @@ class FailurePredictor(Measure):
         return float(scipy.special.expit(seen @ np.array(weights) + bias))
 
 
-class Chance(Measure):
+class Chance(Doubt):
     """A number that is drawn for each step, the same in each session: a rival that knows nothing."""
 
     @classmethod
@@ -247,7 +257,7 @@ class Chance(Measure):
         return float(self._rng.random())
 
 
-class Clock(Measure):
+class Clock(Doubt):
     """The number of steps since the episode began, or since a teacher handed back: a rival that asks at fixed times."""
 
     def begin(self) -> None:
@@ -259,21 +269,21 @@ class Clock(Measure):
         return float(self._steps)
 
 
-class Always(Measure):
+class Always(Doubt):
     """Doubt without limit, so that it always asks."""
 
     def __call__(self, step: Step) -> float:
         return float("inf")
 
 
-class Never(Measure):
+class Never(Doubt):
     """No doubt, so that it never asks."""
 
     def __call__(self, step: Step) -> float:
         return float("-inf")
 
 
-DOUBTS: Mapping[str, Member[Any]] = {
+_SHIPPED: Mapping[str, Member[type[Doubt]]] = {
     "distance": Member(Distance, "asks where the state is far from all demonstrated ones"),
     "discrepancy": Member(Discrepancy, "asks where the action differs from those that were demonstrated nearby"),
     "ensemble": Member(Ensemble, "asks where several learners of the same demonstrations disagree"),
@@ -286,6 +296,34 @@ DOUBTS: Mapping[str, Member[Any]] = {
     "never": Member(Never, "asks at none"),
 }
 UNCALIBRATED = ("always", "never")
+
+
+def _adopted(name: str, thing: Any) -> Member[type[Doubt]]:
+    """The row of a rule that another package, a file or a Python session adds. Raises BadInput if it is none."""
+    if not (isinstance(thing, type) and issubclass(thing, Doubt) and thing.__call__ is not Doubt.__call__):
+        raise wanted(thing, "a subclass of lab.Doubt with __call__")
+    return Member(thing, first_line(thing))
+
+
+DOUBTS = Family("doubts", _SHIPPED, _adopted)
+
+
+def check_rule(rule: str, where: str) -> None:
+    """Raises BadInput, which names `where` it came from, for a rule that DOUBTS does not have."""
+    if rule not in DOUBTS:
+        raise from_file("rule", rule, where) or unknown("rule", rule, tuple(DOUBTS), where)
+
+
+def doubted(doubt: Doubt, step: Step) -> float:
+    """The doubt at a step. Raises BadInput if a rule of somebody's own returns no number."""
+    value: Any = doubt(step)
+    if type(value) is not float:
+        if isinstance(value, bool) or not isinstance(value, Real | np.number):
+            raise BadInput(f"the rule {type(doubt).__name__} returned {shortened(repr(value))}: wanted a number")
+        value = float(value)
+    if value != value:  # not a number: no threshold is below it, and none above
+        raise BadInput(f"the rule {type(doubt).__name__} returned nan: wanted a number")
+    return float(value)
 
 
 def steps_of(demonstrated: Demonstrated, episode: Episode) -> list[Step]:
@@ -311,7 +349,7 @@ def doubts_of(doubt: Doubt, demonstrated: Demonstrated, episode: Episode) -> Arr
     doubt.begin()
     doubts = []
     for step, corrected in zip(steps_of(demonstrated, episode), episode.corrected.tolist(), strict=True):
-        doubts.append(doubt(step))
+        doubts.append(doubted(doubt, step))
         if corrected:
             doubt.begin()
     return np.array(doubts)

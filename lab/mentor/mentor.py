@@ -7,11 +7,11 @@ from typing import Any, Self
 
 import numpy as np
 
-from lab.errors import BadInput, counted, unknown
+from lab.errors import BadInput, counted
 from lab.files import read_limited, write_whole
 from lab.mentor.conformal import Promise, few_false_alarms, many_caught
 from lab.mentor.demonstrated import Array, Demonstrated
-from lab.mentor.doubts import DOUBTS, UNCALIBRATED, Arrays, Doubt, Step, doubts_of
+from lab.mentor.doubts import DOUBTS, UNCALIBRATED, Arrays, Doubt, Step, check_rule, doubted, doubts_of
 from lab.mentor.judge import Judge
 from lab.mentor.mentor_file import Kept, decode, encode
 from lab.recordings.episode import Episode, Recording
@@ -69,8 +69,7 @@ class Mentor:
         threshold: float = float("inf"),
         promise: Promise | None = None,
     ) -> None:
-        if rule not in DOUBTS:
-            raise unknown("rule", rule, tuple(DOUBTS), "mentor")
+        check_rule(rule, "mentor")
         self.rule, self.demonstrated, self.arrays = rule, demonstrated, arrays
         self.state_names, self.action_names = tuple(state_names), tuple(action_names)
         self.threshold, self.promise, self.judge = threshold, promise, Judge()
@@ -82,16 +81,22 @@ class Mentor:
 
     @classmethod
     def learn(
-        cls, recording: Recording, rule: str = "distance", *, rollouts: Iterable[Episode] = (), seed: int = 0
+        cls,
+        recording: Recording,
+        rule: str | type[Doubt] = "distance",
+        *,
+        rollouts: Iterable[Episode] = (),
+        seed: int = 0,
     ) -> Self:
         """A mentor for policies that were cloned from a recording; it never asks until `calibrate` sets its threshold.
 
+        rule: a name, or a subclass of `lab.Doubt`.
         rollouts: of the policy, with known success: what the rule "failure" learns from; other ones calibrate it. seed: of all
         draws.
         Raises BadInput for an unknown rule, and if nothing was demonstrated.
         """
-        if rule not in DOUBTS:
-            raise unknown("rule", rule, tuple(DOUBTS), "mentor")
+        rule = DOUBTS.named(rule)
+        check_rule(rule, "mentor")
         rng, seen = np.random.default_rng(seed), tuple(rollouts)
         demonstrated = Demonstrated.of(recording.episodes, rng)
         threshold = 0.0 if rule in UNCALIBRATED else float("inf")
@@ -181,7 +186,7 @@ class Mentor:
         self.judge.saw(step.left, corrected)
         if corrected:
             self._doubt.begin()
-        doubt = self._doubt(step)
+        doubt = doubted(self._doubt, step)
         rejected = self.judge.rejects
         return Question(doubt > self.threshold and not rejected, doubt, self.threshold, self.rule, rejected)
 
@@ -196,13 +201,16 @@ class Mentor:
             raise BadInput(f"mentor file '{path}' cannot be written: {error.strerror or error}") from error
 
     @classmethod
-    def load(cls, path: Path | str) -> Self:
-        """The mentor in a file. Raises BadInput, which names the file, if it cannot be read or holds anything else."""
+    def load(cls, path: Path | str, rule: type[Doubt] | None = None) -> Self:
+        """The mentor in a file; rule: the class of its rule, if that does not ship.
+
+        Raises BadInput, which names the file, if it cannot be read, holds anything else, or is of a rule that is not known here.
+        """
         try:
             content = read_limited(Path(path), MOST_BYTES)
         except OSError as error:
             raise BadInput(f"mentor file '{path}': {error.strerror or error}: wanted one that `save` wrote") from error
-        kept, demonstrated, arrays = decode(content, str(path))
+        kept, demonstrated, arrays = decode(content, str(path), rule)
         try:
             mentor = cls(
                 kept.rule, demonstrated, arrays, kept.state_names, kept.action_names, kept.threshold, kept.promise
@@ -225,8 +233,7 @@ def parted(rule: str, rollouts: Sequence[Episode]) -> tuple[Sequence[Episode], S
 
     Raises BadInput for an unknown rule.
     """
-    if rule not in DOUBTS:
-        raise unknown("rule", rule, tuple(DOUBTS), "mentor")
+    check_rule(rule, "mentor")
     return (rollouts[::2], rollouts[1::2]) if DOUBTS[rule].make.learns_from_rollouts else ((), rollouts)
 
 

@@ -9,11 +9,12 @@ import numpy as np
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
-from lab.errors import BadInput
+from lab.errors import BadInput, shortened
 from lab.files import json_of
 from lab.mentor.conformal import Promise
 from lab.mentor.demonstrated import Array, Demonstrated
-from lab.mentor.doubts import DOUBTS
+from lab.mentor.doubts import DOUBTS, Doubt
+from lab.plugins.code_file import from_file
 from lab.toolbox.policy_file import header_of, ordered
 
 FORMAT = "teaching-lab mentor 1"
@@ -48,13 +49,23 @@ def encode(kept: Kept, demonstrated: Demonstrated, arrays: Mapping[str, Array]) 
     return ordered(save(contiguous, {"format": FORMAT, "mentor": json.dumps(said, allow_nan=False)}))
 
 
-def decode(content: bytes, where: str) -> tuple[Kept, Demonstrated, dict[str, Array]]:
-    """What a file holds, completely checked. Raises BadInput, which names the file `where`, if anything is wrong."""
+def decode(content: bytes, where: str, own: type[Doubt] | None = None) -> tuple[Kept, Demonstrated, dict[str, Array]]:
+    """What a file holds, completely checked; own: its rule, if that is not known yet.
+
+    Raises BadInput, which names the file `where`, if anything is wrong.
+    """
     try:
-        return _read(content)
+        kept, looked_up, arrays = _read(content)
     except (SafetensorError, ValueError, TypeError, KeyError, RecursionError, MemoryError, BadInput) as error:
         why = " ".join(str(error).split()) or type(error).__name__
         raise BadInput(f"mentor file {where}: {why}: wanted one that `Mentor.save` wrote") from error
+    if own is not None and kept.rule not in DOUBTS:
+        DOUBTS.use(kept.rule, own)
+    if kept.rule not in DOUBTS:
+        raise from_file("rule", kept.rule, f"mentor file {where}") or BadInput(
+            f"mentor file {where}: its rule '{shortened(kept.rule)}' is not known here: give its class, Mentor.load(path, MyRule)"
+        )
+    return kept, looked_up, arrays
 
 
 def _read(content: bytes) -> tuple[Kept, Demonstrated, dict[str, Array]]:
@@ -67,13 +78,13 @@ def _read(content: bytes) -> tuple[Kept, Demonstrated, dict[str, Array]]:
         if array.dtype != np.float64 or not np.isfinite(array).all():
             raise ValueError(f"{name} holds other than finite numbers of 64 bits")
     looked_up = Demonstrated(*(tensors[name] for name in _LOOKED_UP))
-    own = {name.removeprefix(_OWN): array for name, array in tensors.items() if name.startswith(_OWN)}
+    arrays = {name.removeprefix(_OWN): array for name, array in tensors.items() if name.startswith(_OWN)}
     rule, states, actions = said["rule"], _names(said["state_names"]), _names(said["action_names"])
-    if rule not in DOUBTS:
+    if not isinstance(rule, str):
         raise ValueError(f"rule {rule!r}")
     _check_shapes(looked_up, len(states), len(actions))
     promise = None if said["promise"] is None else Promise(**_from_text(said["promise"]))
-    return Kept(rule, states, actions, float.fromhex(said["threshold"]), promise), looked_up, own
+    return Kept(rule, states, actions, float.fromhex(said["threshold"]), promise), looked_up, arrays
 
 
 def _check_shapes(looked_up: Demonstrated, states: int, actions: int) -> None:

@@ -11,7 +11,7 @@ from lab.errors import BadInput
 from lab.lazy import scipy
 from lab.mentor.conformal import few_false_alarms
 from lab.mentor.demonstrated import Array, Demonstrated, shows_what_to_do
-from lab.mentor.doubts import DOUBTS, doubts_of
+from lab.mentor.doubts import DOUBTS, check_rule, doubts_of
 from lab.recordings.episode import Episode, Recording
 
 FOLDS = 5  # an episode's doubt is measured by a mentor that learned from the other folds
@@ -77,8 +77,10 @@ def rules_compared(
     window_s: how long before a takeover an alarm counts as its warning. false_alarms: the share of the stretches without a
     takeover in which a rule may ask; it sets the threshold for an episode by all other episodes (cross-conformal, so that twice
     the share is the guarantee in the worst case; Barber et al. 2021).
-    Raises BadInput if nobody took over, or if there are too few stretches without a takeover.
+    Raises BadInput for an unknown rule, if nobody took over, or if there are too few stretches without a takeover.
     """
+    for name in rules:
+        check_rule(name, "rules")
     episodes, window = recording.episodes, max(1, round(window_s * recording.fps))
     takeovers = sum(len(episode.takeovers()) for episode in episodes)
     if not takeovers:

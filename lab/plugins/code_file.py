@@ -60,7 +60,9 @@ def from_file(kind: str, name: str, where: str) -> BadInput | None:
     stem, dot, thing = name.partition(".")
     if not (dot and stem.isidentifier() and thing.isidentifier()):
         return None
-    again = f"name it again, such as --{kind} ./{stem}.py:{thing} (lab replay: --own ./{stem}.py:{thing})"
+    again = f"name it again, such as --{kind} ./{stem}.py:{thing}"
+    if kind != "rule":  # of a mentor, which no lesson has
+        again += f" (lab replay: --own ./{stem}.py:{thing})"
     return BadInput(f"{kind} '{name}' ({where}): it came from a file, whose code is not run unasked: {again}")
 
 

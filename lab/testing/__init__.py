@@ -2,6 +2,7 @@
 
 from lab.testing.contracts import (
     check_advisor,
+    check_doubt,
     check_gate,
     check_learner,
     check_sequencer,
@@ -9,4 +10,12 @@ from lab.testing.contracts import (
     check_study,
 )
 
-__all__ = ["check_advisor", "check_gate", "check_learner", "check_sequencer", "check_skill", "check_study"]
+__all__ = [
+    "check_advisor",
+    "check_doubt",
+    "check_gate",
+    "check_learner",
+    "check_sequencer",
+    "check_skill",
+    "check_study",
+]

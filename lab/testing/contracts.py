@@ -18,6 +18,9 @@ from lab.learning.session_result import SessionResult
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.updates import UPDATES, Update
 from lab.mdp import TabularMDP, greedy_path, grid, optimal_values, shortest_steps
+from lab.mentor.doubts import DOUBTS, Doubt
+from lab.mentor.mentor import Mentor
+from lab.recordings.episode import Episode, Recording
 from lab.sequencing import SEQUENCERS, Find, find_sequence
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.methods.exact import optimum
@@ -100,6 +103,42 @@ def check_advisor(advisor: str | Advisor | Ask | type[Advisor]) -> None:
         require(result.helped_steps <= int(result.visits.sum()), "more helped steps than steps")
         asked = sum(isinstance(event, AdviceRequested) for event in events)
         require(asked == result.requests, f"{asked} episodes were told to ask, {result.requests} were counted")
+
+
+def check_doubt(rule: str | type[Doubt]) -> None:
+    """Tests a rule of doubt, given by name or class: its numbers repeat, an episode begins it anew, and a file gives it back."""
+    name, rng = DOUBTS.named(rule), np.random.default_rng(0)
+    what = f"rule '{name}'"
+    shown = Recording(10, "cart", ("x", "y"), ("dx", "dy"), [_ride(rng, True) for _ in range(6)])
+    rollouts = [_ride(rng, success) for success in (True, False) * 4]
+    mentor, again = (Mentor.learn(shown, name, rollouts=rollouts, seed=1) for _ in range(2))
+    asked, other = _ride(rng, True), _ride(rng, False)
+    doubts = mentor.doubts(asked)
+    require(doubts.shape == (len(asked),), f"{what}: {doubts.shape} doubts of {len(asked)} steps")
+    require(np.array_equal(doubts, again.doubts(asked)), f"{what}: the same seed gives other doubts")
+    for array in mentor.arrays.values():
+        require(
+            array.dtype == np.float64 and bool(np.isfinite(array).all()),
+            f"{what}: {array.dtype}: wanted finite float64",
+        )
+    if name == "random":  # what it draws goes on from episode to episode
+        return
+    again.doubts(other)
+    require(
+        np.array_equal(again.doubts(asked), doubts), f"{what}: it doubts otherwise after another episode: see `begin`"
+    )
+    with TemporaryDirectory() as folder:
+        mentor.save(file := Path(folder, "mentor.safetensors"))
+        loaded = Mentor.load(file)
+    require(np.array_equal(loaded.doubts(asked), doubts), f"{what}: a file gives other doubts")
+
+
+def _ride(rng: np.random.Generator, success: bool) -> Episode:
+    """A cart that rolls from anywhere near 0 to the right, or fails and rolls back; 20 steps, with plans of two actions."""
+    ways = rng.normal(0.1 if success else -0.05, 0.02, (20, 2)).astype(np.float32)
+    states = (rng.normal(0.0, 0.1, 2) + np.cumsum(ways, axis=0)).astype(np.float32)
+    plans = np.stack([ways, np.roll(ways, -1, axis=0)], axis=1)
+    return Episode("go right", states, ways, np.zeros(20, bool), success, extra={"chunk": plans})
 
 
 def check_session(learner: str, gate: str, memory: bool = False) -> None:

@@ -9,18 +9,16 @@ import numpy as np
 
 from lab.errors import counted
 from lab.lazy import matplotlib
-from lab.mentor.doubts import DOUBTS
-from lab.mentor.takeovers import Rule, RulesCompared
+from lab.mentor.takeovers import RULES, Rule, RulesCompared
 from lab.recordings.episode import Episode, Image
 from lab.version import __version__
 from lab.view.canvas import BLUE, GREEN, GREY, INK, ORANGE, PALE_GREY, PURPLE, RED, SKY, picture_bytes, seconds
 from lab.view.printed_page import printed_page
 
 TEMPLATE = Path(__file__).with_name("mentor_report.html")
-COLOURS = {
-    **dict(zip(DOUBTS, (BLUE, ORANGE, GREEN, PURPLE, RED, SKY), strict=False)),
-    "clock": GREY,
-}
+COLOURS = dict(
+    zip(RULES, (BLUE, ORANGE, GREEN, PURPLE, RED, SKY, GREY), strict=True)
+)  # one of somebody's own is in ink
 MOST_EPISODES = 12  # that are drawn, those with takeovers first
 MOST_FRAMES = 6  # of an episode
 MOST_DOUBT = 3.0  # thresholds high that a plot is

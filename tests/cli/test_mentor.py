@@ -41,6 +41,14 @@ def test_it_compares_the_rules(lab: Any, datasets: dict[str, Path], tmp_path: Pa
     assert "distance" in lab("mentor", str(datasets["taken"]), "--window", "2").out
 
 
+def test_a_rule_from_a_file_is_compared_with_those_that_ship(lab: Any, datasets: dict[str, Path], root: Path) -> None:
+    words = "mentor", str(datasets["taken"]), "--window", "2", "--json", "--rule"
+    ran = lab(*words, f"{root}/examples/own_doubt.py:Hesitation")
+    assert [row["rule"] for row in ran.json["rules"]][-1] == "own_doubt.Hesitation"
+    assert "runs the code of" in ran.err
+    assert "unknown rule 'distence' (--rule): did you mean 'distance'?" in lab(*words, "distence").err
+
+
 def test_it_keeps_a_mentor_with_its_promise(lab: Any, datasets: dict[str, Path], tmp_path: Path) -> None:
     kept = tmp_path / "mentor.safetensors"
     words = [

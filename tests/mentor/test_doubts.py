@@ -1,5 +1,8 @@
 """The measures of doubt, on a cart on a line: each number here can be redone by hand."""
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -8,6 +11,7 @@ from lab.mentor.demonstrated import Demonstrated
 from lab.mentor.doubts import DOUBTS, Doubt, Step, steps_of
 from lab.mentor.mentor import Mentor
 from lab.recordings.episode import Episode, Recording
+from lab.testing import check_doubt
 from tests.mentor.conftest import Run
 
 TIMES = 3  # each place of the cart was demonstrated as often
@@ -124,16 +128,58 @@ def test_a_number_that_never_moved_counts_but_does_not_outweigh_all(run: Run) ->
 
 
 @pytest.mark.parametrize("rule", DOUBTS)
-def test_every_rule_keeps_its_contract(rule: str, recording: Recording, run: Run, straight: Episode) -> None:
-    """The same seed gives the same doubts; a file gives them back; an episode does not depend on the one before."""
-    stuck = run([0.1 * min(step, 3) for step in range(11)], success=False)
-    planned = np.stack([np.vstack([stuck.actions, stuck.actions])[step : step + 3] for step in range(11)])
-    told = Episode("go", stuck.states, stuck.actions, stuck.corrected, False, extra={"chunk": planned})
-    mentors = [Mentor.learn(recording, rule, rollouts=[straight, stuck], seed=7) for _ in range(2)]
-    first, again = (mentor.doubts(told) for mentor in mentors)
-    assert len(first) == len(told)
-    assert first.tolist() == again.tolist()
-    assert not np.isnan(first).any()
-    if rule != "random":
-        assert mentors[0].doubts(told).tolist() == first.tolist()
+def test_every_rule_keeps_its_contract(rule: str) -> None:
+    check_doubt(rule)
     assert DOUBTS[rule].help.startswith("asks ")
+
+
+class Slow(Doubt):
+    """Asks where the action is small."""
+
+    returned: Any = None
+
+    def __call__(self, step: Step) -> float:
+        return -float(abs(step.action).max()) if self.returned is None else self.returned
+
+
+def test_a_rule_of_ones_own_is_calibrated_kept_and_given_back(recording: Recording, run: Run, tmp_path: Path) -> None:
+    check_doubt(Slow)
+    mentor = Mentor.learn(recording, Slow)
+    mentor.calibrate([run([0.1 * step for step in range(5)])] * 9, false_alarms=0.2)
+    assert bool(mentor([0.5], [0.05]))
+    assert not mentor([0.5], [0.2])
+    mentor.save(tmp_path / "slow")
+    assert Mentor.load(tmp_path / "slow").threshold == mentor.threshold
+    content = (tmp_path / "slow").read_bytes()
+    (tmp_path / "other").write_bytes(content.replace(b"Slow", b"Slew"))
+    with pytest.raises(BadInput, match="its rule 'Slew' is not known here: give its class"):
+        Mentor.load(tmp_path / "other")
+    assert Mentor.load(tmp_path / "other", Slow).rule == "Slew"
+    (tmp_path / "filed").write_bytes(content.replace(b"Slow", b"m.Sl"))
+    with pytest.raises(BadInput, match=r"whose code is not run unasked: name it again, such as --rule ./m.py:Sl$"):
+        Mentor.load(tmp_path / "filed")
+
+
+@pytest.mark.parametrize("returned", [float("nan"), "much", True, [1.0]])
+def test_what_is_no_number_is_refused(returned: Any, recording: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Slow, "returned", returned)
+    with pytest.raises(BadInput, match="the rule Slow returned"):
+        Mentor.learn(recording, Slow)([0.5], [0.1])
+
+
+@pytest.mark.parametrize("thing", [Doubt, int, type("Silent", (Doubt,), {})])
+def test_what_is_no_rule_is_refused(thing: Any, recording: Recording) -> None:
+    with pytest.raises(BadInput, match=r"wanted a subclass of lab\.Doubt with __call__"):
+        Mentor.learn(recording, thing)
+
+
+def test_a_rule_that_remembers_another_episode_breaks_the_contract() -> None:
+    class Grows(Doubt):
+        count = 0
+
+        def __call__(self, step: Step) -> float:
+            self.count += 1
+            return float(self.count)
+
+    with pytest.raises(AssertionError, match=r"see `begin`"):
+        check_doubt(Grows)

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from lab.testing import check_advisor, check_gate, check_learner, check_sequencer, check_study
+from lab.testing import check_advisor, check_doubt, check_gate, check_learner, check_sequencer, check_study
 
 EXAMPLES = Path(__file__).resolve().parent.parent.parent / "examples"
 RUN = "import sys; from lab.cli import main; sys.argv[0] = 'lab'; main()"
@@ -44,6 +44,7 @@ def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "teaching_lab.gates": {"no-module": "nowhere:Gate", "no-gate": "own_study:hints", "ccrl": "own_gate:WhileLost"},
         "teaching_lab.learners": {"no-learner": "own_gate:WhileLost"},
         "teaching_lab.advisors": {"no-advisor": "own_gate:WhileLost"},
+        "teaching_lab.doubts": {"no-doubt": "own_gate:WhileLost", "distance": "own_doubt:Hesitation"},
         "teaching_lab.sequencers": {"no-method": "own_gate:NoSuchThing"},
         "teaching_lab.studies": {"no-study": "own_gate:WhileLost"},
         "teaching_lab.skills": {"no-skill": "own_study:hints"},
@@ -68,6 +69,7 @@ def test_each_is_short() -> None:
 def test_each_keeps_its_contract() -> None:
     check_gate(loaded("own_gate").WhileLost)
     check_advisor(loaded("own_advisor").towards_the_goal)
+    check_doubt(loaded("own_doubt").Hesitation)
     check_learner(loaded("own_learner").ExpectedSarsa)
     check_sequencer(loaded("own_sequencer").last_first)
     check_study(loaded("own_study").hints)
@@ -92,6 +94,7 @@ def test_an_installed_package_is_known_everywhere(package: Path, tmp_path: Path)
     ordered = lab(tmp_path, "sequence", "toast", "--case", "II", "--method", "last-first", "--json", on_path=package)
     assert '"method": "last-first"' in ordered.stdout, ordered.stderr
     assert "How many hints" in lab(tmp_path, "study", "list", on_path=package).stdout
+    assert "hesitation" in lab(tmp_path, "clone", "--help", on_path=package).stdout
 
 
 def test_what_is_faulty_is_named_and_left_out(package: Path, tmp_path: Path) -> None:
@@ -110,6 +113,11 @@ def test_what_is_faulty_is_named_and_left_out(package: Path, tmp_path: Path) -> 
         assert line.startswith("lab: ")
         assert line.endswith(why) or why in line
         assert name == "ccrl" or f" {name}," not in told.stdout
+    told = lab(tmp_path, "clone", "--help", on_path=package)
+    assert "'no-doubt' of package 'faulty' (own_gate:WhileLost) is left out: " in told.stderr
+    assert (
+        "'distance' of package 'faulty' (own_doubt:Hesitation) is left out: the name 'distance' is taken" in told.stderr
+    )
     assert lab(tmp_path, "--help", on_path=package).stderr == ""
     quiet = lab(tmp_path, "teach", "world-1", "--gate", "ccrl", "--episodes", "5", on_path=package)
     assert "package" not in quiet.stderr  # what ships is found without looking
