@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from lab.lazy import matplotlib
 from lab.statistics import proportion_interval
 from lab.view.canvas import BLUE, INK, picture_file
 
@@ -17,9 +18,13 @@ def success_by_questions(successes: Sequence[Sequence[bool]], questions: Sequenc
         axes = figure.add_subplot()
         axes.vlines(questions, [low for _, low, _ in shares], [high for _, _, high in shares], color=INK, linewidth=1.2)
         axes.plot(questions, [share for share, _, _ in shares], "o-", color=BLUE, markersize=6)
+        before = 0.0
         for number, (asked, (share, _, _)) in enumerate(zip(questions, shares, strict=True)):
-            axes.annotate(f"round {number}", (asked, share), (5, 5), textcoords="offset points", fontsize=8)
+            label = (-5, 5 if share >= before else -12)  # beside the line from the round before
+            axes.annotate(f"round {number}", (asked, share), label, textcoords="offset points", fontsize=8, ha="right")
+            before = share
         axes.set(xlabel="questions", ylabel=f"successes of {len(successes[0])} episodes [%]", ylim=(0, 105))
         axes.set_title(title)
-        axes.margins(x=0.12)
+        axes.margins(x=0.16)
+        axes.xaxis.set_major_locator(matplotlib.ticker.MaxNLocator(integer=True))
         axes.grid()
