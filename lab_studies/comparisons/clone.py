@@ -28,6 +28,7 @@ DOUBTING = ("distance", "discrepancy", "ensemble", "chunk", "progress", "failure
 RIVALS = ("random", "clock", "always", "never")
 OPTIONS = CloningOptions(rounds=2, questions=10, calibrated=12, evaluated=30, false_alarms=0.2)
 NOISE = 0.1  # of each action, as a share of the commanded velocity
+ALL = "all"  # the sessions of every skill
 GOAL = 0.9  # the share of successes whose questions are counted
 MOST = OPTIONS.rounds * OPTIONS.questions  # questions
 MEASURES = (
@@ -71,18 +72,15 @@ def clone(job: Job, reading: Mapping[str, Any]) -> Findings:
         done[session] = results
         job.keep(asdict(session) | {"results": _RESULTS.dump_python(results, mode="json")})
         job.progress(len(done), len(sessions))
-    rows = [
-        one
-        for skill in SKILLS
-        for one in rows_of(skill, [done[session] for session in sessions if session.skill == skill])
-    ]
+    of_skill = {skill: [done[session] for session in sessions if session.skill == skill] for skill in SKILLS}
+    of_skill[ALL] = [results for several in [*of_skill.values()] for results in several]
+    rows = [one for skill, results in of_skill.items() for one in rows_of(skill, results)]
     says: Row = {}
-    for skill in SKILLS:
+    for skill in of_skill:
         for rule in (*DOUBTING, "clock"):
-            last = {"skill": skill, "rule": rule, "round": OPTIONS.rounds, "measure": "gain_percent"}
+            gains = those(rows, skill=skill, rule=rule, round=OPTIONS.rounds, measure="gain_percent")
             says[f"{skill}: {rule} at equal questions [points of success]"] = ", ".join(
-                "{value:.1f} ({ci95[0]:.1f} to {ci95[1]:.1f}) over {against}".format_map(gain)
-                for gain in those(rows, **last)
+                "{value:.1f} ({ci95[0]:.1f} to {ci95[1]:.1f}) over {against}".format_map(gain) for gain in gains
             )
     limits = ", ".join(f"{seconds:g} s ({skill})" for skill, seconds in SKILLS.items())
     pictures = {f"Success against questions, {skill}": _picture(those(rows, skill=skill)) for skill in SKILLS}
