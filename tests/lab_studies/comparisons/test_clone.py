@@ -1,6 +1,7 @@
 """The study of when a clone should ask: its numbers from measurements written by hand, and a session of every rule on a line."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +10,8 @@ from lab.cloning.rounds import CloningOptions, Measured
 from lab.mentor.conformal import Promise
 from lab.recordings.episode import Recording
 from lab.studies.findings import those
+from lab.studies.runner import Job
+from lab_studies.comparisons import clone
 from lab_studies.comparisons.clone import DOUBTING, MOST, RIVALS, Results, rows_of, rules_tried
 from tests.cloning.conftest import rolled_out, straight_on
 
@@ -62,6 +65,27 @@ def test_warnings_are_counted_over_failures_and_alarms_over_successes() -> None:
     assert alarms["value"] == pytest.approx(100 * 4 / 16)
     (lead,) = those(rows, rule="distance", round=0, measure="lead_s")
     assert lead["value"] == pytest.approx(2.0)
+
+
+def test_sessions_are_kept_and_pooled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def measured_by_hand(of: clone.Session) -> Results:
+        rounds = {"distance": 9 if of.skill == "grasp" else 6, "random": 5}
+        return {
+            rule: [measured(number, rounds.get(rule, 4) if number else 4, 5 * number) for number in range(3)]
+            for rule in (*DOUBTING, *RIVALS)
+        }
+
+    def nothing_is_left(of: clone.Session) -> Results:
+        raise AssertionError(of)
+
+    job = Job(sessions=2, folder=tmp_path)
+    monkeypatch.setattr(clone, "results_of", measured_by_hand)
+    found = clone.clone(job, {})
+    last = {"rule": "distance", "round": 2, "measure": "gain_percent", "against": "random"}
+    gains = [those(found.rows, skill=skill, **last)[0]["value"] for skill in (*clone.SKILLS, clone.ALL)]
+    assert gains == pytest.approx([40.0, 10.0, 10.0, 20.0])
+    monkeypatch.setattr(clone, "results_of", nothing_is_left)
+    assert clone.clone(job, {}).rows == found.rows
 
 
 def test_every_rule_begins_with_the_same_student() -> None:
