@@ -16,7 +16,9 @@ FAMILIES: dict[str, Family[Any]] = {"gates": GATES, "learners": UPDATES, "adviso
 def take_again(files: Mapping[str, tuple[str, str]]) -> None:
     """Add members from files to the families of this process; files: by name, the kind of family and the word for `take`.
 
+    Members of other families than a lesson's are not needed here, and left out.
     The files' code runs, so they are those that the user has named. Raises BadInput as `take` does.
     """
     for kind, word in files.values():
-        take(FAMILIES[kind], word)
+        if kind in FAMILIES:
+            take(FAMILIES[kind], word)
