@@ -14,7 +14,6 @@ from lab.files import json_of
 from lab.mentor.conformal import Promise
 from lab.mentor.demonstrated import Array, Demonstrated
 from lab.mentor.doubts import DOUBTS, Doubt
-from lab.plugins.code_file import from_file
 from lab.toolbox.policy_file import header_of, ordered
 
 FORMAT = "teaching-lab mentor 1"
@@ -62,8 +61,9 @@ def decode(content: bytes, where: str, own: type[Doubt] | None = None) -> tuple[
     if own is not None and kept.rule not in DOUBTS:
         DOUBTS.use(kept.rule, own)
     if kept.rule not in DOUBTS:
-        raise from_file("rule", kept.rule, f"mentor file {where}") or BadInput(
-            f"mentor file {where}: its rule '{shortened(kept.rule)}' is not known here: give its class, Mentor.load(path, MyRule)"
+        raise BadInput(
+            f"mentor file {where}: its rule '{shortened(kept.rule)}' is not known here: give its class, "
+            "Mentor.load(path, MyRule), or name its file, --rule ./mine.py:MyRule"
         )
     return kept, looked_up, arrays
 
