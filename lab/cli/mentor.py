@@ -51,10 +51,10 @@ def mentor(
     """
     if (keep is None) != (rollouts is None):
         raise BadInput("--keep and --rollouts: wanted both, or neither")
-    if keep is None and rule in deferred.RULES:
-        raise BadInput(f"--rule {rule} without --keep: it is among the rules that are compared: remove --rule")
     if rule is not None:
         deferred.check_rule(rule, "--rule")
+        if keep is None and not deferred.DOUBTS.is_added(rule):
+            raise BadInput(f"--rule {rule} without --keep: the rules that ship are compared anyway: remove --rule")
     rules = deferred.RULES if rule is None else (*deferred.RULES, rule)
     if keep is not None and report is not None:
         raise BadInput("--report beside --keep: a report compares rules: leave one of them away")

@@ -317,12 +317,8 @@ def check_rule(rule: str, where: str) -> None:
 def doubted(doubt: Doubt, step: Step) -> float:
     """The doubt at a step. Raises BadInput if a rule of somebody's own returns no number."""
     value: Any = doubt(step)
-    if type(value) is not float:
-        if isinstance(value, bool) or not isinstance(value, Real | np.number):
-            raise BadInput(f"the rule {type(doubt).__name__} returned {shortened(repr(value))}: wanted a number")
-        value = float(value)
-    if value != value:  # not a number: no threshold is below it, and none above
-        raise BadInput(f"the rule {type(doubt).__name__} returned nan: wanted a number")
+    if isinstance(value, bool) or not isinstance(value, Real) or value != value:  # no number is above or below nan
+        raise BadInput(f"the rule {type(doubt).__name__} returned {shortened(repr(value))}: wanted a number")
     return float(value)
 
 
