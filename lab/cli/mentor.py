@@ -54,7 +54,7 @@ def mentor(
     if rule is not None:
         deferred.check_rule(rule, "--rule")
         if keep is None and not deferred.DOUBTS.is_added(rule):
-            raise BadInput(f"--rule {rule} without --keep: the rules that ship are compared anyway: remove --rule")
+            raise BadInput(f"--rule {rule} without --keep: only a rule of your own joins those compared: remove --rule")
     rules = deferred.RULES if rule is None else (*deferred.RULES, rule)
     if keep is not None and report is not None:
         raise BadInput("--report beside --keep: a report compares rules: leave one of them away")
