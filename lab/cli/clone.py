@@ -13,7 +13,7 @@ from lab.cli import deferred
 from lab.cli.families import from_files, offers
 from lab.cli.options import Json, Port
 from lab.cli.output import console, show
-from lab.errors import BadInput, counted, unknown
+from lab.errors import BadInput, counted, shortened, unknown
 from lab.lazy import rich
 
 TEACHERS = ("scripted", "terminal", "page")
@@ -30,6 +30,13 @@ def clone(
     demonstrations: Annotated[
         int | None,
         typer.Option("--demonstrations", min=1, max=10_000, help="Episodes of the teacher at the start; default: 15."),
+    ] = None,
+    dataset: Annotated[
+        Path | None,
+        typer.Option(
+            "--dataset",
+            help="Begin with the demonstrations in this folder, a LeRobot dataset, in place of the teacher's.",
+        ),
     ] = None,
     rounds: Annotated[
         int | None,
@@ -96,6 +103,10 @@ def clone(
     """
     if (skill is None) == (resume is None):
         raise BadInput("wanted a skill, or --resume DIR; one of the two")
+    if dataset is not None and demonstrations is not None:
+        raise BadInput(
+            "--demonstrations beside --dataset: a session begins with all that the dataset shows: remove one"
+        )
     if teacher not in TEACHERS:
         raise unknown("teacher", teacher, TEACHERS, "--teacher")
     if plot is not None:
@@ -110,9 +121,10 @@ def clone(
         "epochs": epochs,
         "seed": seed,
     }
+    shown = None
     if resume is not None:
         kept = deferred.cloning_options_of(resume)
-        for name, value in (own | {"task": task, "noise": noise, "out": out}).items():
+        for name, value in (own | {"dataset": dataset, "task": task, "noise": noise, "out": out}).items():
             if value is not None and not (
                 name == "rule" and value == kept.options.rule
             ):  # from a file, it is named again
@@ -127,15 +139,18 @@ def clone(
             deferred.check_new_cloning(out)
         options = deferred.CloningOptions(**_given(own | {"rounds": rounds}))
         problem = deferred.SkillProblem(**_given({"task": task, "skill": skill, "noise": noise}))
+        problem.env  # noqa: B018  # a task or skill that is unknown is refused before anything is written
+        if dataset is not None:
+            shown = problem.taken(deferred.read_recording(dataset), f"dataset '{dataset}' (--dataset)")
+            options = replace(options, demonstrations=len(shown.episodes))
         kept = deferred.KeptCloningOptions(problem, options)
-        kept.problem.env  # noqa: B018  # a task or skill that is unknown is refused before anything is written
     if not as_json:
-        console().print(_beginning(kept.options), markup=False)
+        console().print(_beginning(kept.options, shown), markup=False)
     folder = resume or out
     measured = list[Any]()
     try:
         with _person(teacher, port, kept) as person:
-            for session in deferred.rounds_of(kept, folder, person):
+            for session in deferred.rounds_of(kept, folder, person, shown):
                 measured = session.measured
                 console().print(_line(measured[-1]), markup=False)
     finally:
@@ -161,9 +176,11 @@ def _given(values: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in values.items() if value is not None}
 
 
-def _beginning(options: "deferred.CloningOptions") -> str:
+def _beginning(options: "deferred.CloningOptions", shown: Any) -> str:
+    told = {episode.task for episode in shown.episodes} if shown is not None else set[str]()
+    of = f" of '{shortened(', '.join(sorted(told)), 60)}'" if told else ""
     return (
-        f"{counted(options.demonstrations, 'demonstration')}, then rounds: in each up to {options.episodes} episodes with a "
+        f"{counted(options.demonstrations, 'demonstration')}{of}, then rounds: in each up to {options.episodes} episodes with a "
         f"teacher, {options.calibrated} that calibrate the mentor, and {options.evaluated} that measure the student"
     )
 

@@ -49,24 +49,32 @@ def options_of(folder: Path) -> KeptOptions:
     return read_json(folder / SESSION, KeptOptions, f"session '{folder}' (--resume)", _WANTED)
 
 
-def rounds_of(kept: KeptOptions, folder: Path | None, person: PersonRollouts | None = None) -> Iterator[Cloning]:
+def rounds_of(
+    kept: KeptOptions,
+    folder: Path | None,
+    person: PersonRollouts | None = None,
+    demonstrations: Recording | None = None,
+) -> Iterator[Cloning]:
     """The session after its last round in a folder, if that holds one, and after each further round, which is kept in the folder.
 
-    folder: None keeps nothing; person: who takes over in place of the scripted teacher, and of whom each episode is kept at once.
+    folder: None keeps nothing; person: who takes over in place of the scripted teacher, and of whom each episode is kept at once;
+    demonstrations: what a new session begins with, in place of the scripted teacher's.
     Raises BadInput for a damaged folder, WorkFailed if it cannot be written.
     """
     problem, options = kept.problem, kept.options
     roll_out = problem if person is None else person
     question = Hears().question if person is None else person.hear
     if folder is None:
-        yield from cloned(roll_out, problem.demonstrated(options), options, hears=Hears(question))
+        yield from cloned(roll_out, demonstrations or problem.demonstrated(options), options, hears=Hears(question))
         return
+    if demonstrations is not None:  # before the session's file, beside which the scripted teacher shows what is missing
+        write(demonstrations, folder / DEMONSTRATIONS)
     if not (folder / SESSION).exists():
         _write(folder / SESSION, json.dumps(asdict(kept), indent=1))
     if not (folder / DEMONSTRATIONS).is_dir():
         write(problem.demonstrated(options), folder / DEMONSTRATIONS)
-    demonstrations = read(folder / DEMONSTRATIONS)
-    session = loaded(folder, demonstrations)
+    shown = read(folder / DEMONSTRATIONS)
+    session = loaded(folder, shown)
     known = 0
     if session is not None:
         known = len(session.corrections)
@@ -79,7 +87,7 @@ def rounds_of(kept: KeptOptions, folder: Path | None, person: PersonRollouts | N
             name = f"{corrected.place}-{corrected.questions}"
             write(problem.recorded([corrected.episode]), folder / f"{BEGUN}{number}" / name)
 
-    for after in cloned(roll_out, demonstrations, options, session, hears=Hears(question, keep_episode)):
+    for after in cloned(roll_out, shown, options, session, hears=Hears(question, keep_episode)):
         _keep(folder, problem, after, known)
         rmtree(folder / f"{BEGUN}{number}", ignore_errors=True)
         known, number = len(after.corrections), len(after.measured)

@@ -1,12 +1,14 @@
 """A skill of a task as a problem to clone: its environment in physics, its scripted teacher, and their episodes."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from lab.cloning.rounds import DEMONSTRATING, Asks, CloningOptions, Policy, seeds_for
 from lab.control import ControlEnv, ScriptedTeacher, recording, roll_out
 from lab.control.control_env import CONTROL_S
+from lab.errors import BadInput, shortened
+from lab.mentor.demonstrated import shows_what_to_do
 from lab.recordings.episode import Episode, Recording
 
 
@@ -50,6 +52,26 @@ class SkillProblem:
     def recorded(self, episodes: Sequence[Episode]) -> Recording:
         """Episodes with the names of the states and actions."""
         return recording(self.env, episodes)
+
+    def taken(self, recording: Recording, source: str) -> Recording:
+        """Somebody's episodes, without pictures and extra features, as demonstrations of this skill.
+
+        source: what an error calls them. Raises BadInput unless they have this skill's states, actions and steps a second, and
+        one shows what to do.
+        """
+        for what, found, wanted in (
+            ("states", recording.state_names, self.env.state_names),
+            ("actions", recording.action_names, self.env.action_names),
+            ("steps a second", (str(recording.fps),), (str(self.fps),)),
+        ):
+            if found != wanted:
+                own = shortened(", ".join(found), 60)
+                raise BadInput(f"{source}: its {what} are {own}: wanted those of {self.skill}, {', '.join(wanted)}")
+        if not any(shows_what_to_do(episode).any() for episode in recording.episodes):
+            raise BadInput(
+                f"{source}: all of its episodes failed, without corrections: wanted one or more to learn from"
+            )
+        return self.recorded([replace(episode, pictures={}, extra={}) for episode in recording.episodes])
 
     def close(self) -> None:
         """Frees the physics."""

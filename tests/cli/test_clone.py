@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+from lab.recordings.lerobot_read import read
+
 SHORT = ("--demonstrations", "1", "--evaluated", "1", "--epochs", "2", "--rule", "always", "--questions", "1")
 
 
@@ -21,6 +23,10 @@ def test_it_clones_asks_and_goes_on(lab: Callable[..., Any], tmp_path: Path) -> 
     assert ">round 1</text>" in plot.read_text(encoding="utf-8")
     assert "1 question" in after.err
     assert "LeRobot" in after.out
+    shown, other = read(out / "demonstrations"), tmp_path / "other"
+    begun = ("--dataset", str(out / "demonstrations"), "--evaluated", "1", "--epochs", "2", "--rounds", "0")
+    assert lab("clone", "grasp", *begun, "--seed", "5", "--out", str(other), "--json").json["rounds"]
+    assert read(other / "demonstrations").episodes[0].actions.tobytes() == shown.episodes[0].actions.tobytes()
 
 
 @pytest.mark.parametrize(
@@ -34,6 +40,8 @@ def test_it_clones_asks_and_goes_on(lab: Callable[..., Any], tmp_path: Path) -> 
         (["--resume", "nothing"], "nothing"),
         (["grasp", "--plot", "x.gif"], "x.gif"),
         (["grasp", "--resume", "nothing"], "one of the two"),
+        (["grasp", "--dataset", "nothing"], "nothing"),
+        (["grasp", "--dataset", "nothing", "--demonstrations", "3"], "--demonstrations beside --dataset"),
     ],
 )
 def test_bad_input_is_one_line(
