@@ -78,6 +78,13 @@ def clone(
     teacher: Annotated[
         str, typer.Option("--teacher", help="Who takes over: scripted, or you at the terminal or on a page.")
     ] = "scripted",
+    demonstrator: Annotated[
+        str | None,
+        typer.Option(
+            "--demonstrator",
+            help="Who demonstrates at the start: scripted, or person, who also takes over; default: scripted.",
+        ),
+    ] = None,
     port: Port = 0,
     epochs: Annotated[
         int | None,
@@ -103,12 +110,13 @@ def clone(
     """
     if (skill is None) == (resume is None):
         raise BadInput("wanted a skill, or --resume DIR; one of the two")
-    if dataset is not None and demonstrations is not None:
-        raise BadInput(
-            "--demonstrations beside --dataset: a session begins with all that the dataset shows: remove one"
-        )
+    for option, given in (("--demonstrations", demonstrations), ("--demonstrator", demonstrator)):
+        if dataset is not None and given is not None:
+            raise BadInput(f"{option} beside --dataset: a session begins with all that the dataset shows: remove one")
     if teacher not in TEACHERS:
         raise unknown("teacher", teacher, TEACHERS, "--teacher")
+    if demonstrator == "person" and teacher == "scripted":
+        raise BadInput("--demonstrator person beside --teacher scripted: wanted --teacher page, or --teacher terminal")
     if plot is not None:
         deferred.check_picture(plot)
     deferred.require_extra("lab clone", "recordings")
@@ -124,7 +132,9 @@ def clone(
     shown = None
     if resume is not None:
         kept = deferred.cloning_options_of(resume)
-        for name, value in (own | {"dataset": dataset, "task": task, "noise": noise, "out": out}).items():
+        for name, value in (
+            own | {"dataset": dataset, "demonstrator": demonstrator, "task": task, "noise": noise, "out": out}
+        ).items():
             if value is not None and not (
                 name == "rule" and value == kept.options.rule
             ):  # from a file, it is named again
@@ -143,7 +153,7 @@ def clone(
         if dataset is not None:
             shown = problem.taken(deferred.read_recording(dataset), f"dataset '{dataset}' (--dataset)")
             options = replace(options, demonstrations=len(shown.episodes))
-        kept = deferred.KeptCloningOptions(problem, options)
+        kept = deferred.KeptCloningOptions(problem, options, demonstrator or "scripted")
     if not as_json:
         console().print(_beginning(kept.options, shown), markup=False)
     folder = resume or out

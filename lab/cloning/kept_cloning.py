@@ -11,7 +11,7 @@ from lab.cloning.person import PersonRollouts
 from lab.cloning.rounds import Cloning, CloningOptions, Corrected, Hears, Measured, cloned
 from lab.cloning.skill_problem import SkillProblem
 from lab.cloning.student import Student
-from lab.errors import BadInput, WorkFailed
+from lab.errors import BadInput, WorkFailed, unknown
 from lab.files import check_out, draft, write_whole
 from lab.mentor.judge import Judge
 from lab.mentor.mentor import Mentor
@@ -23,16 +23,22 @@ from lab.tasks.record import read_json
 SESSION, MEASURED = "session.json", "measured.json"
 DEMONSTRATIONS, CORRECTIONS, BEGUN = "demonstrations", "corrections", "begun-"
 STUDENT, MENTOR = "student.safetensors", "mentor.safetensors"
-_EPISODE = re.compile(r"(\d{1,6})-(\d{1,6})")  # place and questions of an episode of a round that was interrupted
+DEMONSTRATORS = ("scripted", "person")
+_EPISODE = re.compile(r"(\d{1,6})-(\d{1,6})")  # place and questions of an episode of what was interrupted
 _WANTED = "a session of `lab clone`"
 
 
 @dataclass(frozen=True)
 class KeptOptions:
-    """What a session was begun with."""
+    """What a session was begun with. demonstrator: who gives the demonstrations, one of DEMONSTRATORS."""
 
     problem: SkillProblem
     options: CloningOptions
+    demonstrator: str = "scripted"
+
+    def __post_init__(self) -> None:
+        if self.demonstrator not in DEMONSTRATORS:
+            raise unknown("demonstrator", self.demonstrator, DEMONSTRATORS, "clone")
 
 
 def check_new(folder: Path) -> None:
@@ -59,20 +65,22 @@ def rounds_of(
 
     folder: None keeps nothing; person: who takes over in place of the scripted teacher, and of whom each episode is kept at once;
     demonstrations: what a new session begins with, in place of the scripted teacher's.
-    Raises BadInput for a damaged folder, WorkFailed if it cannot be written.
+    Raises BadInput for a damaged folder, and where nobody is there who has to demonstrate; WorkFailed if it cannot be written.
     """
     problem, options = kept.problem, kept.options
     roll_out = problem if person is None else person
     question = Hears().question if person is None else person.hear
     if folder is None:
-        yield from cloned(roll_out, demonstrations or problem.demonstrated(options), options, hears=Hears(question))
+        shown = demonstrations or _demonstrated(kept, None, person)
+        yield from cloned(roll_out, shown, options, hears=Hears(question))
         return
     if demonstrations is not None:  # before the session's file, beside which the scripted teacher shows what is missing
         write(demonstrations, folder / DEMONSTRATIONS)
     if not (folder / SESSION).exists():
         _write(folder / SESSION, json.dumps(asdict(kept), indent=1))
     if not (folder / DEMONSTRATIONS).is_dir():
-        write(problem.demonstrated(options), folder / DEMONSTRATIONS)
+        write(_demonstrated(kept, folder, person), folder / DEMONSTRATIONS)
+        rmtree(folder / f"{BEGUN}{DEMONSTRATIONS}", ignore_errors=True)
     shown = read(folder / DEMONSTRATIONS)
     session = loaded(folder, shown)
     known = 0
@@ -84,14 +92,32 @@ def rounds_of(
 
     def keep_episode(corrected: Corrected) -> None:
         if person is not None:
-            name = f"{corrected.place}-{corrected.questions}"
-            write(problem.recorded([corrected.episode]), folder / f"{BEGUN}{number}" / name)
+            _keep_episode(folder / f"{BEGUN}{number}", problem, corrected)
 
     for after in cloned(roll_out, shown, options, session, hears=Hears(question, keep_episode)):
         _keep(folder, problem, after, known)
         rmtree(folder / f"{BEGUN}{number}", ignore_errors=True)
         known, number = len(after.corrections), len(after.measured)
         yield after
+
+
+def _demonstrated(kept: KeptOptions, folder: Path | None, person: PersonRollouts | None) -> Recording:
+    """The demonstrations that a session begins with; a person's are kept in its folder one by one."""
+    if kept.demonstrator == "scripted":
+        return kept.problem.demonstrated(kept.options)
+    if person is None:
+        raise BadInput("the demonstrations of this session are a person's: wanted --teacher page or --teacher terminal")
+    begun = None if folder is None else folder / f"{BEGUN}{DEMONSTRATIONS}"
+    shown = [] if begun is None else _begun(begun)
+    for one in person.demonstrations(kept.options, tuple(shown)):
+        shown.append(one)
+        if begun is not None:
+            _keep_episode(begun, kept.problem, one)
+    return kept.problem.recorded([one.episode for one in shown])
+
+
+def _keep_episode(folder: Path, problem: SkillProblem, one: Corrected) -> None:
+    write(problem.recorded([one.episode]), folder / f"{one.place}-{one.questions}")
 
 
 def loaded(folder: Path, demonstrations: Recording) -> Cloning | None:
@@ -118,7 +144,7 @@ def loaded(folder: Path, demonstrations: Recording) -> Cloning | None:
 
 
 def _begun(folder: Path) -> list[Corrected]:
-    """The kept episodes of a round that was interrupted, in their order."""
+    """The kept episodes of a round, or of demonstrations, that were interrupted, in their order."""
     if not folder.is_dir():
         return []
     found = [_EPISODE.fullmatch(path.name) for path in folder.iterdir()]

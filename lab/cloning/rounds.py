@@ -100,7 +100,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class Corrected:
-    """An episode of a round in which somebody took over: its place among the round's seeds, and its questions."""
+    """An episode in which somebody took over, or which somebody demonstrated: its place among the seeds, and its questions."""
 
     place: int
     questions: int

@@ -41,6 +41,8 @@ def test_it_clones_asks_and_goes_on(lab: Callable[..., Any], tmp_path: Path) -> 
         (["grasp", "--plot", "x.gif"], "x.gif"),
         (["grasp", "--resume", "nothing"], "one of the two"),
         (["grasp", "--dataset", "nothing"], "nothing"),
+        (["grasp", "--demonstrator", "person"], "--teacher page"),
+        (["grasp", "--demonstrator", "persn"], "did you mean 'person'"),
         (["grasp", "--dataset", "nothing", "--demonstrations", "3"], "--demonstrations beside --dataset"),
     ],
 )

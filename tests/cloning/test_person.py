@@ -1,6 +1,8 @@
 """A person as the teacher: asked once a takeover, told where the part is, obeyed in physics."""
 
+import re
 from collections.abc import Iterator
+from math import hypot
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +13,7 @@ from lab.cloning.person import PersonRollouts, PersonTeacher, Situation, situati
 from lab.cloning.rounds import CloningOptions
 from lab.cloning.skill_problem import SkillProblem
 from lab.cloning.takeover_command import TakeoverCommand, command_of
-from lab.errors import WorkFailed
+from lab.errors import BadInput, WorkFailed
 from lab.mentor.mentor import Question
 
 STEPS = 10
@@ -92,6 +94,59 @@ def test_a_session_with_a_person_keeps_each_episode_and_goes_on(problem: SkillPr
     assert (after, last.questions) == (1, 4)
     assert not (folder / "begun-1").exists()
     assert len(last.corrections) == 2
+
+
+def by_the_words(seen: Situation) -> TakeoverCommand:
+    """What somebody would say who reads the situation alone: go above it and turn, then down, close, and up."""
+    numbers = [float(number) for number in re.findall(r"[\d.]+(?= cm| degrees)", seen.where)]
+    ahead, left, up, turn = (
+        -number if word in seen.where else number
+        for number, word in zip(numbers, ("back", "to the right,", "below", "turned to the right"), strict=True)
+    )
+    if "closed" in seen.fingers:
+        return command_of("up 5")
+    if hypot(ahead, left) > 0.7 or abs(turn) > 4.0:
+        words = ["ahead" if ahead > 0 else "back", "left" if left > 0 else "right"]
+        return command_of(
+            f"{words[0]} {abs(ahead):.1f} {words[1]} {abs(left):.1f} turn-{'left' if turn > 0 else 'right'} {abs(turn):.0f}"
+            f" down {max(0.0, -up - 4.0):.1f}"
+        )
+    return command_of(f"down {-up:.1f}" if up < -0.5 else "close")
+
+
+def test_a_person_demonstrates_by_what_they_are_told_and_a_failed_one_does_not_count(
+    problem: SkillProblem, tmp_path: Path
+) -> None:
+    options = CloningOptions(demonstrations=2, rounds=0, calibrated=1, evaluated=1, epochs=2, rule="never")
+    kept, folder, told = KeptOptions(problem, options, "person"), tmp_path / "session", list[Situation]()
+
+    def leaves(seen: Situation) -> TakeoverCommand:
+        """Waits through the first episode, gives the second one, and leaves in the third."""
+        told.append(seen)
+        if "2 of 2" in seen.demonstration:
+            raise WorkFailed("gone")
+        return command_of("wait") if not seen.why else by_the_words(seen)
+
+    with pytest.raises(WorkFailed, match="gone"):
+        [*rounds_of(kept, folder, PersonRollouts(problem, STEPS, leaves))]
+    assert any("does not count" in seen.why for seen in told)
+    (name,) = (path.name for path in (folder / "begun-demonstrations").iterdir())
+    assert name.startswith("1-")  # of the second seed
+
+    with pytest.raises(BadInput, match="--teacher"):
+        next(rounds_of(options_of(folder), folder))
+    after = list[str]()
+
+    def stays(seen: Situation) -> TakeoverCommand:
+        after.append(seen.demonstration)
+        return by_the_words(seen)
+
+    (begun,) = rounds_of(options_of(folder), folder, PersonRollouts(problem, STEPS, stays))
+    assert {*after} == {"Demonstration 2 of 2"}
+    assert [episode.success for episode in begun.demonstrations.episodes] == [True, True]
+    assert not any(episode.corrected.any() for episode in begun.demonstrations.episodes)
+    assert not (folder / "begun-demonstrations").exists()
+    assert len([*rounds_of(options_of(folder), folder)]) == 1  # once they are there, the script can go on
 
 
 def test_the_person_hears_why(problem: SkillProblem) -> None:

@@ -29,9 +29,9 @@ const seat = (() => {
       const asks = Boolean(question);
       if (asks && !open) el("takeover-words").value = "";
       open = asks;
-      el("takeover-title").textContent = asks ? `The clone asks (question ${asked})` : "The clone acts";
+      el("takeover-title").textContent = asks ? question.demonstration || `The clone asks (question ${asked})` : "The arm moves";
       el("takeover-why").textContent = asks ? question.why : "";
-      el("takeover-where").textContent = asks ? `${question.where} ${question.fingers}` : "";
+      el("takeover-where").textContent = asks ? `${question.where} ${question.fingers} ${question.wanted}` : "";
       el("takeover-refusal").textContent = "";
       enable();
       if (asks) el("takeover-words").focus();

@@ -31,7 +31,7 @@ class TakeoverPanel(AnswerPanel[TakeoverCommand]):
     def ask(self, situation: Situation) -> None:
         """Show a situation, and ask for a command from now on."""
         self.open()
-        self.tell(question=asdict(situation), asked=self._known["asked"] + 1)
+        self.tell(question=asdict(situation), asked=self._known["asked"] + (not situation.demonstration))
 
     def command(self) -> TakeoverCommand:
         """The command that a page sends; waits for it."""

@@ -21,7 +21,7 @@ def takeover_prompt(read: ReadLine, console: Console) -> Ask:
         if not told:
             console.print(Text(HELP))
             told = True
-        console.print(Text(f"{situation.why}\n{situation}"))
+        console.print(Text("\n".join(filter(None, (situation.demonstration, situation.why, str(situation))))))
         while True:
             try:
                 return command_of(read("what should the tool do? "))

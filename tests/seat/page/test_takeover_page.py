@@ -2,6 +2,7 @@
 
 import json
 import threading
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -14,7 +15,9 @@ from lab.seat.page.takeover_page import TakeoverPage, TakeoverPanel
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-SEEN = Situation("distance: its doubt is 3, above 2", "The part is 3.0 cm ahead.", "The fingers are <open>.")
+SEEN = Situation(
+    "distance: its doubt is 3, above 2", "The part is 3.0 cm ahead.", "The fingers are <open>.", "Wanted: it."
+)
 
 
 def news(panel: TakeoverPanel, page: int = 1) -> dict[str, Any]:
@@ -28,7 +31,7 @@ def test_a_page_is_told_the_question_and_its_command_is_taken() -> None:
     assert news(panel)["seat"] == {"question": None, "asked": 0}
     panel.ask(SEEN)
     assert panel.stirred()
-    assert news(panel)["seat"]["question"] == {"why": SEEN.why, "where": SEEN.where, "fingers": SEEN.fingers}
+    assert news(panel)["seat"]["question"] == asdict(SEEN)
     panel.said(1, json.dumps({"command": "ahead 2 close"}))
     command = panel.command()
     assert command.moved[0] == pytest.approx(0.02)
@@ -78,6 +81,7 @@ def test_a_command_that_nobody_asked_for_is_refused() -> None:
 
 def test_in_a_browser_the_arm_is_seen_and_a_button_answers(browser_page: "Page") -> None:
     env, answers = ControlEnv("toast", "grasp"), list[TakeoverCommand]()
+    demonstrated = replace(SEEN, demonstration="Demonstration 2 of 15")
     env.reset(seed=1)
     with TakeoverPage() as page:
         page.step(env)
@@ -86,10 +90,16 @@ def test_in_a_browser_the_arm_is_seen_and_a_button_answers(browser_page: "Page")
         shown = browser_page
         shown.goto(page.url)
         shown.wait_for_selector("#takeover-title:has-text('question 1')")
-        assert "The fingers are <open>." in shown.inner_text("#takeover-where")
+        assert "The fingers are <open>. Wanted: it." in shown.inner_text("#takeover-where")
         shown.fill("#takeover-size", "4")
         shown.click("[data-move=left]")
         asking.join(30)
-        shown.wait_for_selector("#takeover-title:has-text('The clone acts')")
+        shown.wait_for_selector("#takeover-title:has-text('The arm moves')")
+        asking = threading.Thread(target=lambda: answers.append(page.ask(demonstrated)), daemon=True)
+        asking.start()
+        shown.wait_for_selector("#takeover-title:has-text('Demonstration 2 of 15')")
+        shown.click("[data-word=close]")
+        asking.join(30)
     env.close()
     assert answers[0].moved == pytest.approx((0.0, 0.04, 0.0, 0.0))
+    assert answers[1].close

@@ -9,7 +9,9 @@ from lab.cloning.person import Situation
 from lab.errors import WorkFailed
 from lab.seat.terminal.takeover_prompt import takeover_prompt
 
-SEEN = Situation("distance: its doubt is 3, above 2", "The part is 3.0 cm ahead.", "The fingers are open.")
+SEEN = Situation(
+    "distance: its doubt is 3, above 2", "The part is 3.0 cm ahead.", "The fingers are open.", "Wanted: it."
+)
 
 
 def test_a_wrong_line_is_asked_again_and_the_end_of_the_input_says_how_to_go_on() -> None:
@@ -26,7 +28,7 @@ def test_a_wrong_line_is_asked_again_and_the_end_of_the_input_says_how_to_go_on(
     told = shown.getvalue()
     assert "turn-left" in told
     assert SEEN.why in told
-    assert "3.0 cm ahead. The fingers are open." in told
+    assert "3.0 cm ahead. The fingers are open. Wanted: it." in told
     assert "did you mean 'ahead'" in told
     with pytest.raises(WorkFailed, match="--resume"):
         ask(SEEN)
