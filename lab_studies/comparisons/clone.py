@@ -27,6 +27,7 @@ SKILLS = {
 DOUBTING = ("distance", "discrepancy", "ensemble", "chunk", "progress", "failure")
 RIVALS = ("random", "clock", "always", "never")
 OPTIONS = CloningOptions(rounds=2, questions=10, calibrated=12, evaluated=30, false_alarms=0.2)
+LATE_S = 1.0  # before an episode is cut, the clock asks: as late as a takeover still fits in
 NOISE = 0.1  # of each action, as a share of the commanded velocity
 ALL = "all"  # the sessions of every skill
 GOAL = 0.9  # the share of successes whose questions are counted
@@ -34,7 +35,8 @@ MOST = OPTIONS.rounds * OPTIONS.questions  # questions
 MEASURES = (
     "A student is cloned from {demonstrations} demonstrations of a skill, whose episodes are cut after {seconds}. In "
     "each of {rounds} rounds it may ask {questions} times; the scripted teacher then takes over for {takeover_steps} "
-    "steps of 0.1 s, and the student learns the corrections. success_percent: of {evaluated} episodes without a "
+    "steps of 0.1 s, and the student learns the corrections. The clock asks {late:g} s before an episode is cut. "
+    "success_percent: of {evaluated} episodes without a "
     "teacher, the same after each round and in nothing else used. questions: so far. gain_percent: success_percent "
     "above what a rival reaches in the same session with as many questions (interpolated linearly; after the same round "
     "if the rival asked fewer). "
@@ -84,7 +86,7 @@ def clone(job: Job, reading: Mapping[str, Any]) -> Findings:
             )
     limits = ", ".join(f"{seconds:g} s ({skill})" for skill, seconds in SKILLS.items())
     pictures = {f"Success against questions, {skill}": _picture(those(rows, skill=skill)) for skill in SKILLS}
-    return Findings(rows, says, pictures, (MEASURES.format(**asdict(OPTIONS), seconds=limits),))
+    return Findings(rows, says, pictures, (MEASURES.format(**asdict(OPTIONS), seconds=limits, late=LATE_S),))
 
 
 @dataclass(frozen=True)
@@ -104,18 +106,20 @@ def results_of(session: Session) -> Results:
     problem = SkillProblem("toast", session.skill, NOISE, SKILLS[session.skill])
     options = replace(OPTIONS, seed=session.seed)
     try:
-        return rules_tried(problem, problem.demonstrated(options), options)
+        before_cut = round((SKILLS[session.skill] - LATE_S) * problem.fps)
+        return rules_tried(problem, problem.demonstrated(options), options, before_cut)
     finally:
         problem.close()
 
 
-def rules_tried(roll_out: RollsOut, demonstrations: Recording, options: CloningOptions) -> Results:
-    """The measurements of every rule, each of which begins with the same student."""
+def rules_tried(roll_out: RollsOut, demonstrations: Recording, options: CloningOptions, clock_steps: int) -> Results:
+    """The measurements of every rule, each of which begins with the same student; the clock asks after so many steps."""
     alone = _Remembered(roll_out)
     first = Student.learn(demonstrations, seed=options.seed, epochs=options.epochs)
     results = {}
     for rule in (*DOUBTING, *RIVALS):
-        *_, last = cloned(alone, demonstrations, replace(options, rule=rule), first=first)
+        own = replace(options, rule=rule, every_steps=clock_steps if rule == "clock" else options.every_steps)
+        *_, last = cloned(alone, demonstrations, own, first=first)
         results[rule] = last.measured
     return results
 
