@@ -29,7 +29,7 @@ const seat = (() => {
       const asks = Boolean(question);
       if (asks && !open) el("takeover-words").value = "";
       open = asks;
-      el("takeover-title").textContent = asks ? question.demonstration || `The clone asks (question ${asked})` : "The arm moves";
+      el("takeover-title").textContent = asks ? question.demonstration || `The clone asks (question ${asked})` : "Nothing is asked now";
       el("takeover-why").textContent = asks ? question.why : "";
       el("takeover-where").textContent = asks ? `${question.where} ${question.fingers} ${question.wanted}` : "";
       el("takeover-refusal").textContent = "";
