@@ -187,7 +187,7 @@ function drawingTime() {
 function keepUp(steps) {
   if (!steps.length || drawingTime() < SLOW_MS) return;
   steps[0]();
-  panel.spare();
+  panel.spare?.();
   viewer.scene.traverse((object) => { if (object.material) object.material.needsUpdate = true; });
   viewer.set_dirty();
   setTimeout(keepUp, 0, steps.slice(1));
@@ -212,8 +212,8 @@ function follow(pause = 300) {
       setTimeout(keepUp, 0, PLAINER);
     }
     if (frame && frame.time_s !== null) note(frame.time_s ? `${frame.time_s.toFixed(1)} s` : "");
-    if (panel && frame && frame.time_s !== null) panel.clock(frame.time_s);
-    if (panel && scene) panel.hasScene();
+    if (panel && frame && frame.time_s !== null) panel.clock?.(frame.time_s);
+    if (panel && scene) panel.hasScene?.();
     if (panel && parts) panel.update(parts);
     if (panel && refusal) panel.refused(refusal);
     if (told) classBar.show(told);

@@ -48,6 +48,11 @@ const seat = (() => {
     for (const part of el("finding-form").querySelectorAll("input, button")) part.disabled = !send || chosen || (part.type === "text" && !part.closest("li").querySelector("[type=checkbox]").checked);
   }
 
+  function online(how) {
+    send = how;
+    enable();
+  }
+
   el("finding-form").onsubmit = (event) => {
     event.preventDefault();
     el("finding-refusal").textContent = "";
@@ -66,20 +71,8 @@ const seat = (() => {
       enable();
     },
     refused: (text) => { el("finding-refusal").textContent = text; },
-    connected(how) {
-      send = how;
-      enable();
-    },
-    lost() {
-      send = null;
-      enable();
-    },
-    over() {
-      send = null;
-      enable();
-    },
-    clock() {},
-    spare() {},
-    hasScene() {},
+    connected: online,
+    lost: () => online(null),
+    over: () => online(null),
   };
 })();

@@ -9,6 +9,11 @@ const seat = (() => {
     for (const part of el("takeover-form").querySelectorAll("button, input")) part.disabled = !send || !open;
   }
 
+  function online(how) {
+    send = how;
+    enable();
+  }
+
   function tell(command) {
     if (!send || !open) return;
     el("takeover-refusal").textContent = "";
@@ -37,20 +42,8 @@ const seat = (() => {
       if (asks) el("takeover-words").focus();
     },
     refused: (text) => { el("takeover-refusal").textContent = text; },
-    connected(how) {
-      send = how;
-      enable();
-    },
-    lost() {
-      send = null;
-      enable();
-    },
-    over() {
-      send = null;
-      enable();
-    },
-    clock() {},
-    spare() {},
-    hasScene() {},
+    connected: online,
+    lost: () => online(null),
+    over: () => online(null),
   };
 })();
