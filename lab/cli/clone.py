@@ -16,6 +16,7 @@ from lab.cli.output import console, show
 from lab.errors import BadInput, counted, shortened, unknown
 from lab.lazy import rich
 
+DEMONSTRATORS = ("scripted", "person")
 TEACHERS = ("scripted", "terminal", "page")
 UNPROMISED = ("always", "never", "random", "clock")  # rules whose thresholds no rollouts set
 
@@ -115,8 +116,12 @@ def clone(
             raise BadInput(f"{option} beside --dataset: a session begins with all that the dataset shows: remove one")
     if teacher not in TEACHERS:
         raise unknown("teacher", teacher, TEACHERS, "--teacher")
+    if demonstrator not in (None, *DEMONSTRATORS):
+        raise unknown("demonstrator", demonstrator, DEMONSTRATORS, "--demonstrator")
     if demonstrator == "person" and teacher == "scripted":
         raise BadInput("--demonstrator person beside --teacher scripted: wanted --teacher page, or --teacher terminal")
+    if teacher != "scripted" and resume is None and out is None:
+        raise BadInput(f"--teacher {teacher} without --out: wanted a folder in which all that you show is kept")
     if plot is not None:
         deferred.check_picture(plot)
     deferred.require_extra("lab clone", "recordings")
@@ -152,7 +157,7 @@ def clone(
         problem.env  # noqa: B018  # a task or skill that is unknown is refused before anything is written
         if dataset is not None:
             shown = problem.taken(deferred.read_recording(dataset), f"dataset '{dataset}' (--dataset)")
-            options = replace(options, demonstrations=len(shown.episodes))
+            options, demonstrator = replace(options, demonstrations=len(shown.episodes)), "dataset"
         kept = deferred.KeptCloningOptions(problem, options, demonstrator or "scripted")
     if not as_json:
         console().print(_beginning(kept.options, shown), markup=False)
@@ -173,6 +178,7 @@ def clone(
         "task": kept.problem.task,
         "skill": kept.problem.skill,
         "rule": kept.options.rule,
+        "demonstrator": kept.demonstrator,
         "fps": kept.problem.fps,
         "rounds": [asdict(one) | {"success": one.success} for one in measured],
         "out": None if folder is None else str(folder),
@@ -187,7 +193,7 @@ def _given(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _beginning(options: "deferred.CloningOptions", shown: Any) -> str:
-    told = {episode.task for episode in shown.episodes} if shown is not None else set[str]()
+    told = {episode.task for episode in shown.episodes if episode.task} if shown is not None else set[str]()
     of = f" of '{shortened(', '.join(sorted(told)), 60)}'" if told else ""
     return (
         f"{counted(options.demonstrations, 'demonstration')}{of}, then rounds: in each up to {options.episodes} episodes with a "

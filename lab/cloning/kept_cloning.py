@@ -23,7 +23,7 @@ from lab.tasks.record import read_json
 SESSION, MEASURED = "session.json", "measured.json"
 DEMONSTRATIONS, CORRECTIONS, BEGUN = "demonstrations", "corrections", "begun-"
 STUDENT, MENTOR = "student.safetensors", "mentor.safetensors"
-DEMONSTRATORS = ("scripted", "person")
+DEMONSTRATORS = ("scripted", "person", "dataset")
 _EPISODE = re.compile(r"(\d{1,6})-(\d{1,6})")  # place and questions of an episode of what was interrupted
 _WANTED = "a session of `lab clone`"
 
@@ -74,13 +74,11 @@ def rounds_of(
         shown = demonstrations or _demonstrated(kept, None, person)
         yield from cloned(roll_out, shown, options, hears=Hears(question))
         return
-    if demonstrations is not None:  # before the session's file, beside which the scripted teacher shows what is missing
-        write(demonstrations, folder / DEMONSTRATIONS)
     if not (folder / SESSION).exists():
         _write(folder / SESSION, json.dumps(asdict(kept), indent=1))
     if not (folder / DEMONSTRATIONS).is_dir():
-        write(_demonstrated(kept, folder, person), folder / DEMONSTRATIONS)
-        rmtree(folder / f"{BEGUN}{DEMONSTRATIONS}", ignore_errors=True)
+        write(demonstrations or _demonstrated(kept, folder, person), folder / DEMONSTRATIONS)
+    rmtree(folder / f"{BEGUN}{DEMONSTRATIONS}", ignore_errors=True)
     shown = read(folder / DEMONSTRATIONS)
     session = loaded(folder, shown)
     known = 0
@@ -105,14 +103,19 @@ def _demonstrated(kept: KeptOptions, folder: Path | None, person: PersonRollouts
     """The demonstrations that a session begins with; a person's are kept in its folder one by one."""
     if kept.demonstrator == "scripted":
         return kept.problem.demonstrated(kept.options)
-    if person is None:
-        raise BadInput("the demonstrations of this session are a person's: wanted --teacher page or --teacher terminal")
+    if kept.demonstrator == "dataset":
+        raise BadInput("the demonstrations of this session came from a dataset, and are missing: begin another session")
     begun = None if folder is None else folder / f"{BEGUN}{DEMONSTRATIONS}"
     shown = [] if begun is None else _begun(begun)
-    for one in person.demonstrations(kept.options, tuple(shown)):
-        shown.append(one)
-        if begun is not None:
-            _keep_episode(begun, kept.problem, one)
+    if len(shown) < kept.options.demonstrations:
+        if person is None:
+            raise BadInput(
+                "the demonstrations of this session are a person's: wanted --teacher page or --teacher terminal"
+            )
+        for one in person.demonstrations(kept.options, tuple(shown)):
+            if begun is not None:
+                _keep_episode(begun, kept.problem, one)
+            shown.append(one)
     return kept.problem.recorded([one.episode for one in shown])
 
 

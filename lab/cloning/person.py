@@ -14,6 +14,7 @@ from lab.control import ControlEnv, ScriptedTeacher, roll_out
 from lab.control.control_env import CONTROL_S
 from lab.control.control_scene import LIFTED_M, REACHED_M, REACHED_RAD
 from lab.control.controlled_skill import Aim
+from lab.errors import WorkFailed
 from lab.mentor.mentor import Question
 from lab.recordings.episode import Episode
 
@@ -44,7 +45,8 @@ class PersonRollouts:
     def demonstrations(self, options: CloningOptions, begun: Sequence[Corrected] = ()) -> Iterator[Corrected]:
         """The person's demonstrations after those begun, until there are as many as wanted; one that fails is left out.
 
-        Each comes with its number of commands and its place among the seeds.
+        Each comes with its number of commands and its place among the seeds. Raises WorkFailed if too few of TRIES times as many
+        episodes end well.
         """
         good, seeds = len(begun), seeds_for(options, DEMONSTRATING, TRIES * options.demonstrations)
         failed = False
@@ -58,6 +60,8 @@ class PersonRollouts:
             if not failed:
                 good += 1
                 yield Corrected(place, self.teacher.asked, episode)
+        if good < options.demonstrations:
+            raise WorkFailed(f"{good} of {options.demonstrations} demonstrations ended well in {len(seeds)} episodes")
 
     def _demonstrating(self, observation: Any) -> Action:
         self.on_step(self.problem.env)
@@ -137,8 +141,10 @@ def situation(env: ControlEnv, why: str, demonstration: str = "") -> Situation:
     wanted = {
         Aim.TAKE: f"the fingers closed on the part, and lifted by {100 * LIFTED_M:g} cm",
         Aim.SET_DOWN: f"the part in its place, then the open fingers {100 * LIFTED_M:g} cm above",
-        Aim.REACH: f"the tool within {100 * REACHED_M:g} cm and {degrees(REACHED_RAD):.0f} degrees of the goal",
+        Aim.REACH: f"the tool within {100 * REACHED_M:g} cm and {degrees(REACHED_RAD):.1f} degrees of the goal",
     }[env.skill.aim]
+    if env.skill.aim is Aim.REACH and env.skill.skill.carries:
+        wanted += ", the part between the fingers"
     fingers = f"The fingers are {opening}; {holds}."
     return Situation(why, f"{name} is {', '.join(parts)}.", fingers, f"Wanted: {wanted}.", demonstration)
 

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import zip_longest
 
 from lab.cloning.rounds import DEMONSTRATING, Asks, CloningOptions, Policy, seeds_for
 from lab.control import ControlEnv, ScriptedTeacher, recording, roll_out
@@ -56,22 +57,26 @@ class SkillProblem:
     def taken(self, recording: Recording, source: str) -> Recording:
         """Somebody's episodes, without pictures and extra features, as demonstrations of this skill.
 
-        source: what an error calls them. Raises BadInput unless they have this skill's states, actions and steps a second, and
-        one shows what to do.
+        source: what an error calls them. Raises BadInput unless they have this skill's states, actions and steps a second, are
+        not those of another skill of the task, and one shows what to do.
         """
         for what, found, wanted in (
             ("states", recording.state_names, self.env.state_names),
             ("actions", recording.action_names, self.env.action_names),
             ("steps a second", (str(recording.fps),), (str(self.fps),)),
         ):
-            if found != wanted:
-                own = shortened(", ".join(found), 60)
-                raise BadInput(f"{source}: its {what} are {own}: wanted those of {self.skill}, {', '.join(wanted)}")
-        if not any(shows_what_to_do(episode).any() for episode in recording.episodes):
-            raise BadInput(
-                f"{source}: all of its episodes failed, without corrections: wanted one or more to learn from"
-            )
-        return self.recorded([replace(episode, pictures={}, extra={}) for episode in recording.episodes])
+            for a, b in zip_longest(found, wanted, fillvalue="nothing more"):
+                if a != b:
+                    raise BadInput(
+                        f"{source}: its {what} have '{shortened(a, 40)}': wanted '{b}' there, as in {self.skill}"
+                    )
+        episodes = [episode for episode in recording.episodes if len(episode)]
+        for told in sorted({episode.task for episode in episodes}):
+            if self.env.skill.is_of_other_kind(told):
+                raise BadInput(f"{source}: it shows '{told}': wanted '{self.env.skill.skill.name}'")
+        if not any(shows_what_to_do(episode).any() for episode in episodes):
+            raise BadInput(f"{source}: it shows nothing: wanted an episode that did not fail, or corrected steps")
+        return self.recorded([replace(episode, pictures={}, extra={}) for episode in episodes])
 
     def close(self) -> None:
         """Frees the physics."""

@@ -73,6 +73,11 @@ class ControlledSkill:
         """The skill's table."""
         return self.skill.problem.mdp
 
+    def is_of_other_kind(self, name: str) -> bool:
+        """Whether a name is that of a skill of this task for another sub-task."""
+        found = SkillSet.of(self.task, self.task.fitting(TAUGHT_WITH)).skills.get(name)
+        return found is not None and found.subtask != self.skill.subtask
+
     @cached_property
     def arm(self) -> Arm:
         """The task's arm."""

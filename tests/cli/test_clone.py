@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from shutil import rmtree
 from typing import Any
 
 import pytest
@@ -25,8 +26,28 @@ def test_it_clones_asks_and_goes_on(lab: Callable[..., Any], tmp_path: Path) -> 
     assert "LeRobot" in after.out
     shown, other = read(out / "demonstrations"), tmp_path / "other"
     begun = ("--dataset", str(out / "demonstrations"), "--evaluated", "1", "--epochs", "2", "--rounds", "0")
-    assert lab("clone", "grasp", *begun, "--seed", "5", "--out", str(other), "--json").json["rounds"]
+    ran = lab("clone", "grasp", *begun, "--seed", "5", "--out", str(other))
+    assert "1 demonstration of 'grasp at plate'" in ran.err
     assert read(other / "demonstrations").episodes[0].actions.tobytes() == shown.episodes[0].actions.tobytes()
+
+    rmtree(other / "demonstrations")
+    assert "came from a dataset" in lab("clone", "--resume", str(other)).err
+
+
+def test_a_person_demonstrates_on_the_command_line(lab: Callable[..., Any], tmp_path: Path) -> None:
+    out = tmp_path / "mine"
+    words = ("--teacher", "terminal", "--demonstrator", "person", "--rounds", "0", "--out", str(out))
+    ran = lab("clone", "grasp", *SHORT, *words, "--json", stdin="teacher\n" * 10)
+    assert ran.json["demonstrator"] == "person"
+    (episode,) = read(out / "demonstrations").episodes
+    assert episode.success
+    assert not episode.corrected.any()
+
+
+def test_what_a_person_shows_needs_a_folder(lab: Callable[..., Any]) -> None:
+    ran = lab("clone", "grasp", "--teacher", "terminal", stdin="wait\n")
+    assert ran.code == 2
+    assert "--out" in ran.err
 
 
 @pytest.mark.parametrize(
@@ -43,6 +64,7 @@ def test_it_clones_asks_and_goes_on(lab: Callable[..., Any], tmp_path: Path) -> 
         (["grasp", "--dataset", "nothing"], "nothing"),
         (["grasp", "--demonstrator", "person"], "--teacher page"),
         (["grasp", "--demonstrator", "persn"], "did you mean 'person'"),
+        (["grasp", "--demonstrator", "dataset"], "person, scripted"),
         (["grasp", "--dataset", "nothing", "--demonstrations", "3"], "--demonstrations beside --dataset"),
     ],
 )

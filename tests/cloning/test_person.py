@@ -1,18 +1,18 @@
 """A person as the teacher: asked once a takeover, told where the part is, obeyed in physics."""
 
-import re
 from collections.abc import Iterator
-from math import hypot
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from devtools.told_teacher import by_the_words
 from lab.cloning.kept_cloning import KeptOptions, options_of, rounds_of
 from lab.cloning.person import PersonRollouts, PersonTeacher, Situation, situation
 from lab.cloning.rounds import CloningOptions
 from lab.cloning.skill_problem import SkillProblem
 from lab.cloning.takeover_command import TakeoverCommand, command_of
+from lab.control import ControlEnv
 from lab.errors import BadInput, WorkFailed
 from lab.mentor.mentor import Question
 
@@ -96,24 +96,6 @@ def test_a_session_with_a_person_keeps_each_episode_and_goes_on(problem: SkillPr
     assert len(last.corrections) == 2
 
 
-def by_the_words(seen: Situation) -> TakeoverCommand:
-    """What somebody would say who reads the situation alone: go above it and turn, then down, close, and up."""
-    numbers = [float(number) for number in re.findall(r"[\d.]+(?= cm| degrees)", seen.where)]
-    ahead, left, up, turn = (
-        -number if word in seen.where else number
-        for number, word in zip(numbers, ("back", "to the right,", "below", "turned to the right"), strict=True)
-    )
-    if "closed" in seen.fingers:
-        return command_of("up 5")
-    if hypot(ahead, left) > 0.7 or abs(turn) > 4.0:
-        words = ["ahead" if ahead > 0 else "back", "left" if left > 0 else "right"]
-        return command_of(
-            f"{words[0]} {abs(ahead):.1f} {words[1]} {abs(left):.1f} turn-{'left' if turn > 0 else 'right'} {abs(turn):.0f}"
-            f" down {max(0.0, -up - 4.0):.1f}"
-        )
-    return command_of(f"down {-up:.1f}" if up < -0.5 else "close")
-
-
 def test_a_person_demonstrates_by_what_they_are_told_and_a_failed_one_does_not_count(
     problem: SkillProblem, tmp_path: Path
 ) -> None:
@@ -147,6 +129,31 @@ def test_a_person_demonstrates_by_what_they_are_told_and_a_failed_one_does_not_c
     assert not any(episode.corrected.any() for episode in begun.demonstrations.episodes)
     assert not (folder / "begun-demonstrations").exists()
     assert len([*rounds_of(options_of(folder), folder)]) == 1  # once they are there, the script can go on
+
+
+def test_what_is_wanted_is_said_and_a_teacher_who_does_it_ends_the_episode_well() -> None:
+    for skill, wanted in (
+        ("grasp", "lifted by 3 cm"),
+        ("place", "open fingers 3 cm above"),
+        ("transfer", "1.5 cm and 5.7"),
+    ):
+        env = ControlEnv("toast", skill)
+        env.reset(seed=3)
+        told = situation(env, "")
+        assert wanted in told.wanted
+        assert wanted in str(told)
+        assert ("between the fingers" in told.wanted) == (skill == "transfer")
+        env.close()
+
+
+def test_a_person_who_always_fails_is_not_asked_for_ever(
+    problem: SkillProblem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("lab.cloning.person.TRIES", 2)
+    options = CloningOptions(demonstrations=1, rounds=0, calibrated=1, evaluated=1, epochs=2)
+    waits = PersonRollouts(problem, STEPS, lambda seen: TakeoverCommand())
+    with pytest.raises(WorkFailed, match=r"0 of 1 demonstrations .* 2 episodes"):
+        next(rounds_of(KeptOptions(problem, options, "person"), None, waits))
 
 
 def test_the_person_hears_why(problem: SkillProblem) -> None:

@@ -21,10 +21,13 @@ def problem() -> Iterator[SkillProblem]:
 @pytest.fixture
 def shown(problem: SkillProblem) -> Recording:
     """Two episodes of somebody's, with a picture a step."""
-    states = np.zeros((3, len(problem.env.state_names)), np.float32)
-    actions = np.zeros((3, len(problem.env.action_names)), np.float32)
+    rng = np.random.default_rng(4)
+    states = rng.uniform(size=(3, len(problem.env.state_names))).astype(np.float32)
+    actions = rng.uniform(size=(3, len(problem.env.action_names))).astype(np.float32)
     pictures = {"wrist": [np.zeros((8, 8, 3), np.uint8)] * 3}
-    episode = Episode("take it", states, actions, np.array([False, True, False]), True, pictures)
+    episode = Episode(
+        "take it", states, actions, np.array([False, True, False]), True, pictures, {"next.reward": states[:, 0]}
+    )
     return Recording(10, "another arm", problem.env.state_names, problem.env.action_names, [episode] * 2)
 
 
@@ -32,17 +35,26 @@ def test_the_numbers_and_marks_are_taken(problem: SkillProblem, shown: Recording
     taken = problem.taken(shown, "mine")
     assert [episode.takeovers() for episode in taken.episodes] == [[(1, 2)], [(1, 2)]]
     assert not taken.episodes[0].pictures
+    assert not taken.episodes[0].extra
+    assert np.array_equal(taken.episodes[0].states, shown.episodes[0].states)
+    assert np.array_equal(taken.episodes[0].actions, shown.episodes[0].actions)
+    assert taken.robot != shown.robot
 
 
 def test_other_demonstrations_are_refused(problem: SkillProblem, shown: Recording) -> None:
-    names = shown.state_names
-    with pytest.raises(BadInput, match="mine: its states are x, "):
-        problem.taken(replace(shown, state_names=("x", *names[1:])), "mine")
-    with pytest.raises(BadInput, match=r"steps a second are 30: .* 10"):
+    first, second, *rest = shown.state_names
+    with pytest.raises(BadInput, match=f"mine: its states have '{second}': wanted '{first}' there"):
+        problem.taken(replace(shown, state_names=(second, first, *rest)), "mine")
+    with pytest.raises(BadInput, match="steps a second have '30': wanted '10'"):
         problem.taken(replace(shown, fps=30), "mine")
     narrow = [replace(episode, actions=np.zeros((3, 1), np.float32)) for episode in shown.episodes]
-    with pytest.raises(BadInput, match=f"actions are go: .*, {', '.join(shown.action_names)}"):
-        problem.taken(replace(shown, action_names=("go",), episodes=narrow), "mine")
+    with pytest.raises(BadInput, match=f"actions have 'nothing more': wanted '{shown.action_names[1]}'"):
+        problem.taken(replace(shown, action_names=shown.action_names[:1], episodes=narrow), "mine")
+    other = [replace(episode, task="place at toaster_buffer") for episode in shown.episodes]
+    with pytest.raises(BadInput, match="'place at toaster_buffer': wanted 'grasp at plate'"):
+        problem.taken(replace(shown, episodes=other), "mine")
     nothing = [replace(e, success=False, corrected=np.zeros(3, bool)) for e in shown.episodes]
-    with pytest.raises(BadInput, match="all of its episodes failed"):
+    with pytest.raises(BadInput, match="shows nothing"):
         problem.taken(replace(shown, episodes=nothing), "mine")
+    with pytest.raises(BadInput, match="shows nothing"):
+        problem.taken(replace(shown, episodes=[]), "mine")

@@ -15,7 +15,7 @@ from lab.seat.page.answer_panel import NO_MESSAGE, AnswerPanel
 from lab.sim.frames import Frame, Viewpoint
 from lab.view.meshcat import LiveView
 
-TITLE = "Teaching lab: a clone asks"
+TITLE = "Teaching lab: a clone is taught"
 
 
 class TakeoverPanel(AnswerPanel[TakeoverCommand]):
@@ -23,7 +23,7 @@ class TakeoverPanel(AnswerPanel[TakeoverCommand]):
 
     files: Sequence[Path] = tuple(Path(__file__).with_name(f"takeover.{kind}") for kind in ("html", "css", "js"))
     most_chars = 1 << 12
-    closed = "Nothing is asked now: wait until the mentor asks."
+    closed = "Nothing is asked now: wait for the next question."
 
     def __init__(self) -> None:
         super().__init__({"question": None, "asked": 0})

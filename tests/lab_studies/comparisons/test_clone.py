@@ -88,6 +88,14 @@ def test_sessions_are_kept_and_pooled(tmp_path: Path, monkeypatch: pytest.Monkey
     assert clone.clone(job, {}).rows == found.rows
 
 
+def test_the_clock_asks_as_late_in_every_skill() -> None:
+    assert {skill: clone.clock_steps(skill, 10) for skill in clone.SKILLS} == {
+        "grasp": 50,
+        "place": 50,
+        "transfer": 130,
+    }
+
+
 def test_every_rule_begins_with_the_same_student() -> None:
     options = CloningOptions(rounds=1, questions=2, calibrated=5, episodes=2, evaluated=4, epochs=20, every_steps=6)
     shown = Recording(10, "point", ("x",), ("speed",), [rolled_out(straight_on, seed) for seed in (1, 2)])

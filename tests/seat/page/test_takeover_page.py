@@ -37,6 +37,8 @@ def test_a_page_is_told_the_question_and_its_command_is_taken() -> None:
     assert command.moved[0] == pytest.approx(0.02)
     assert command.close
     assert news(panel)["seat"]["question"] is None
+    panel.ask(replace(SEEN, demonstration="Demonstration 1 of 2"))
+    assert news(panel)["seat"]["asked"] == 1  # questions of the clone alone are counted
 
 
 @pytest.mark.parametrize(
