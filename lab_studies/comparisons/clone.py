@@ -27,7 +27,6 @@ SKILLS = {
 DOUBTING = ("distance", "discrepancy", "ensemble", "chunk", "progress", "failure")
 RIVALS = ("random", "clock", "always", "never")
 OPTIONS = CloningOptions(rounds=2, questions=10, calibrated=12, evaluated=30, false_alarms=0.2)
-LATE_S = 1.0  # as long as a takeover: so late before an episode is cut, and a step more, the clock asks
 NOISE = 0.1  # of each action, as a share of the commanded velocity
 ALL = "all"  # the sessions of every skill
 GOAL = 0.9  # the share of successes whose questions are counted
@@ -35,7 +34,7 @@ MOST = OPTIONS.rounds * OPTIONS.questions  # questions
 MEASURES = (
     "A student is cloned from {demonstrations} demonstrations of a skill, whose episodes are cut after {seconds}. In "
     "each of {rounds} rounds it may ask {questions} times; the scripted teacher then takes over for {takeover_steps} "
-    "steps of 0.1 s, and the student learns the corrections. The clock asks about {late:g} s before an episode is cut. "
+    "steps of 0.1 s, and the student learns the corrections. The clock asks every {every_steps} steps. "
     "success_percent: of {evaluated} episodes without a "
     "teacher, the same after each round and in nothing else used. questions: so far. gain_percent: success_percent "
     "above what a rival reaches in the same session with as many questions (interpolated linearly; after the same round "
@@ -86,7 +85,7 @@ def clone(job: Job, reading: Mapping[str, Any]) -> Findings:
             )
     limits = ", ".join(f"{seconds:g} s ({skill})" for skill, seconds in SKILLS.items())
     pictures = {f"Success against questions, {skill}": _picture(those(rows, skill=skill)) for skill in SKILLS}
-    return Findings(rows, says, pictures, (MEASURES.format(**asdict(OPTIONS), seconds=limits, late=LATE_S),))
+    return Findings(rows, says, pictures, (MEASURES.format(**asdict(OPTIONS), seconds=limits),))
 
 
 @dataclass(frozen=True)
@@ -106,24 +105,18 @@ def results_of(session: Session) -> Results:
     problem = SkillProblem("toast", session.skill, NOISE, SKILLS[session.skill])
     options = replace(OPTIONS, seed=session.seed)
     try:
-        return rules_tried(problem, problem.demonstrated(options), options, clock_steps(session.skill, problem.fps))
+        return rules_tried(problem, problem.demonstrated(options), options)
     finally:
         problem.close()
 
 
-def clock_steps(skill: str, fps: int) -> int:
-    """After how many steps the clock asks."""
-    return round((SKILLS[skill] - LATE_S) * fps)
-
-
-def rules_tried(roll_out: RollsOut, demonstrations: Recording, options: CloningOptions, clock_after: int) -> Results:
-    """The measurements of every rule, each of which begins with the same student; the clock asks after so many steps."""
+def rules_tried(roll_out: RollsOut, demonstrations: Recording, options: CloningOptions) -> Results:
+    """The measurements of every rule, each of which begins with the same student."""
     alone = _Remembered(roll_out)
     first = Student.learn(demonstrations, seed=options.seed, epochs=options.epochs)
     results = {}
     for rule in (*DOUBTING, *RIVALS):
-        own = replace(options, rule=rule, every_steps=clock_after if rule == "clock" else options.every_steps)
-        *_, last = cloned(alone, demonstrations, own, first=first)
+        *_, last = cloned(alone, demonstrations, replace(options, rule=rule), first=first)
         results[rule] = last.measured
     return results
 
