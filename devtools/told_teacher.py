@@ -19,12 +19,9 @@ from lab.cloning.takeover_command import TakeoverCommand, command_of
 from lab.recordings.episode import Recording
 
 SKILLS = ("grasp", "place")
-NEAR_CM, TURNED_DEG, ABOVE_CM, REACHED_CM = (
-    0.7,
-    4.0,
-    4.0,
-    0.5,
-)  # over the part; turned as it is; where to halt; at its height
+NEAR_CM, TURNED_DEG = 0.7, 4.0  # over the part, and turned as it is
+ABOVE_CM = 4.0  # where it halts
+REACHED_CM = 0.5  # from the height at which the fingers close or open
 
 
 def by_the_words(seen: Situation) -> TakeoverCommand:

@@ -60,10 +60,11 @@ class SkillProblem:
         source: what an error calls them. Raises BadInput unless they have this skill's states, actions and steps a second, are
         not those of another skill of the task, and one shows what to do.
         """
+        if recording.fps != self.fps:
+            raise BadInput(f"{source}: {recording.fps} steps a second: wanted {self.fps}")
         for what, found, wanted in (
             ("states", recording.state_names, self.env.state_names),
             ("actions", recording.action_names, self.env.action_names),
-            ("steps a second", (str(recording.fps),), (str(self.fps),)),
         ):
             for a, b in zip_longest(found, wanted, fillvalue="nothing more"):
                 if a != b:

@@ -131,7 +131,7 @@ def test_a_person_demonstrates_by_what_they_are_told_and_a_failed_one_does_not_c
     assert len([*rounds_of(options_of(folder), folder)]) == 1  # once they are there, the script can go on
 
 
-def test_what_is_wanted_is_said_and_a_teacher_who_does_it_ends_the_episode_well() -> None:
+def test_a_person_is_told_what_ends_an_episode_well() -> None:
     for skill, wanted in (
         ("grasp", "lifted by 3 cm"),
         ("place", "open fingers 3 cm above"),

@@ -45,7 +45,7 @@ def test_other_demonstrations_are_refused(problem: SkillProblem, shown: Recordin
     first, second, *rest = shown.state_names
     with pytest.raises(BadInput, match=f"mine: its states have '{second}': wanted '{first}' there"):
         problem.taken(replace(shown, state_names=(second, first, *rest)), "mine")
-    with pytest.raises(BadInput, match="steps a second have '30': wanted '10'"):
+    with pytest.raises(BadInput, match="30 steps a second: wanted 10"):
         problem.taken(replace(shown, fps=30), "mine")
     narrow = [replace(episode, actions=np.zeros((3, 1), np.float32)) for episode in shown.episodes]
     with pytest.raises(BadInput, match=f"actions have 'nothing more': wanted '{shown.action_names[1]}'"):
