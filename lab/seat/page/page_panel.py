@@ -88,7 +88,7 @@ class SeatPanel:
         self._layers: dict[int | None, tuple[int, str]] = {}  # the same of layers that pages have asked for
         self._stirred = 0
         self._late = False  # whether news were held back
-        self._busy = ""  # the console's command under way at the last check
+        self._busy = ""  # the console's command under way, as pages have been told
 
     # ---- called by the session's thread
 
@@ -190,7 +190,6 @@ class SeatPanel:
         with self.lock:
             busy = "" if self.known.console is None else self.known.console.busy
             if busy != self._busy:
-                self._busy = busy
                 self.known.changed("run")
             version = self.known.settle()
             new = version != self._stirred or self._late
@@ -317,7 +316,10 @@ class SeatPanel:
     def _text(self, part: str, now_s: float) -> str:
         version, text = self._texts.get(part, (-1, ""))
         if version != self.known.versions.get(part, 1) or part == "question":  # the remaining time changes
-            text = plain_json(PARTS[part](self.known, now_s))
+            value = PARTS[part](self.known, now_s)
+            if part == "run" and value is not None:
+                self._busy = value["busy"]
+            text = plain_json(value)
             self._texts[part] = (self.known.versions.get(part, 1), text)
         return text
 

@@ -241,6 +241,25 @@ def test_a_run_without_news_sends_nothing(panel: SeatPanel, desk: RunDesk, clock
         assert panel.news(1) == ""
 
 
+@pytest.mark.parametrize("looks_before", [True, False])
+def test_a_command_that_ended_between_two_looks_is_not_shown_as_under_way(
+    panel: SeatPanel, desk: RunDesk, clock: list[float], looks_before: bool
+) -> None:
+    """The server looks for news now and then: a short command begins, is shown, and ends before it looks again."""
+    told(panel)
+    if looks_before:
+        panel.stirred()
+    clock[0] += 1.0
+    desk.busy = "jog +z 20"
+    panel.known.changed("run")
+    assert told(panel)["seat"]["run"]["busy"] == "jog +z 20"
+    desk.busy = ""
+    clock[0] += 1.0
+    assert panel.stirred()
+    assert told(panel)["seat"]["run"]["busy"] == ""
+    assert not panel.stirred()
+
+
 def test_pages_that_come_and_go_are_who_attends(panel: SeatPanel, desk: RunDesk) -> None:
     assert desk.controls.attended
     panel.left(1)
