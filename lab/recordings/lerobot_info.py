@@ -8,7 +8,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from lab.errors import BadInput, shortened, unknown
-from lab.files import json_of, read_limited
+from lab.files import is_file, json_of, read_limited
 
 INFO, STATS, TASKS, EPISODES = "meta/info.json", "meta/stats.json", "meta/tasks.parquet", "meta/episodes"
 DATA_PATH = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
@@ -19,7 +19,8 @@ MOST_EPISODES, MOST_FRAMES = 1_000_000, 100_000_000
 NUMBERS = ("float16", "float32", "float64", "bool", *(f"{u}int{bits}" for u in ("", "u") for bits in (8, 16, 32, 64)))
 STATE, ACTION, PICTURES = "observation.state", "action", "observation.images."
 INDICES = ("timestamp", "frame_index", "episode_index", "index", "task_index")  # features that every dataset has
-_CONVERT = "python -m lerobot.scripts.convert_dataset_v21_to_v30 --repo-id="
+# in place; without its last two options it converts what the Hub has, and replaces it there
+_CONVERT = "python -m lerobot.scripts.convert_dataset_v21_to_v30 --repo-id=USER/NAME --root=FOLDER --push-to-hub=false"
 _FIELD = re.compile(r"\{(\w+)(?::0?(\d))?d?\}")
 
 
@@ -84,7 +85,7 @@ class Info:
 def load_info(folder: Path) -> Info:
     """The info of the dataset in a folder. BadInput if there is none, or says what is wrong with it."""
     path = folder / INFO
-    if not path.is_file():
+    if not is_file(path):
         raise BadInput(f"'{folder}': no {INFO} in it; give the folder of a LeRobot dataset of format v3.0")
     try:
         document = json_of(read_limited(path, MOST_INFO_BYTES))
@@ -94,9 +95,8 @@ def load_info(folder: Path) -> Info:
         raise BadInput(f"'{path}': wanted a JSON object")
     version = document.get("codebase_version")
     if not isinstance(version, str) or not re.fullmatch(r"v?3\.\d+(\.\d+)?", version):
-        old = isinstance(version, str) and re.match(r"v?[12]\.", version)
-        hint = f"; LeRobot converts it: {_CONVERT}USER/NAME" if old else ""
-        raise BadInput(f"'{path}': codebase_version {shortened(repr(version))}: wanted v3.0{hint}")
+        hint = f"; LeRobot converts it: {_CONVERT}" if version in ("v2.1", "2.1") else ""
+        raise BadInput(f"'{shortened(path)}': codebase_version {shortened(repr(version))}: wanted v3.0{hint}")
     return _checked(document, folder, path)
 
 

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.errors import BadInput, counted, unknown
+from lab.errors import BadInput, counted, shortened, unknown
+from lab.files import is_file
 from lab.recordings.episode import Episode, Image, Pictures, Recording
 from lab.recordings.lerobot_info import (
     ACTION,
@@ -159,6 +160,9 @@ def _episode(
     sparse: bool,
 ) -> Episode:
     corrected = np.zeros(row.length, np.bool_)
+    for name in (*INTERVENTIONS, SUCCESS):
+        if name in columns and not np.isfinite(columns[name]).all():
+            raise BadInput(f"'{path}': column '{name}' of episode {row.number}: wanted finite numbers")
     for name in INTERVENTIONS:
         if name in columns:
             corrected |= columns[name].reshape(row.length, -1).any(axis=1)
@@ -206,8 +210,8 @@ def _pictures(
         if feature.dtype == "video":
             chunk, number, from_s = row.videos[name]
             file = info.file(info.video_path or "", chunk, number, name)
-            if not file.is_file():
-                raise BadInput(f"'{file}': no such file")
+            if not is_file(file):
+                raise BadInput(f"'{shortened(file, 200)}': no such file")
             pictures[camera] = VideoPictures(file, from_s + times_s, 0.5 / info.fps)
         elif feature.dtype == "image":
             pictures[camera] = _TablePictures(path, name, first, row.length)

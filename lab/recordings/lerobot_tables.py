@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput, WorkFailed, shortened, unknown
+from lab.files import is_file
 from lab.lazy import pyarrow
 from lab.optional import require
 from lab.recordings.lerobot_info import NUMBERS, Feature
@@ -28,8 +29,8 @@ def _readable(path: Path) -> Iterator[None]:
     try:
         yield
     except (pyarrow.lib.ArrowException, OSError, ValueError, KeyError, ArithmeticError) as error:
-        if not path.is_file():
-            raise BadInput(f"'{path}': no such file") from None
+        if not is_file(path):
+            raise BadInput(f"'{shortened(path, 200)}': no such file") from None
         raise BadInput(f"'{path}': no readable Parquet file: {shortened(error)}") from None
 
 

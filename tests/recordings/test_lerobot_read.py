@@ -108,6 +108,12 @@ def column(folder: Path, file: str, name: str, values: Any) -> None:
     pq.write_table(table, folder / file)
 
 
+def another_column(folder: Path, name: str, values: Any) -> None:
+    """A feature of one number more."""
+    feature(folder, name, dtype="bool", shape=[1])
+    pq.write_table(pq.read_table(folder / DATA).append_column(name, pa.array(values)), folder / DATA)
+
+
 LISTS = [[0.0, 1.0]] * 6
 Damage = Callable[[Path], object]
 
@@ -122,6 +128,7 @@ Damage = Callable[[Path], object]
             lambda f: changed(f, codebase_version="v2.1"),
             "wanted v3.0; LeRobot converts it: python -m lerobot.scripts.conv",
         ),
+        (lambda f: changed(f, codebase_version="v2.0"), "codebase_version 'v2.0': wanted v3.0"),
         (lambda f: changed(f, codebase_version="v4.0"), "codebase_version 'v4.0': wanted v3.0"),
         (lambda f: changed(f, fps=0), "fps 0: wanted a whole number, 1 to 10000"),
         (lambda f: changed(f, fps="30"), "fps '30': wanted"),
@@ -143,6 +150,8 @@ Damage = Callable[[Path], object]
         (lambda f: feature(f, "action", shape=[1]), "column 'action': more than 1 numbers in a row"),
         (lambda f: feature(f, "action", dtype="image"), "feature 'action': image (2,): wanted a row of numbers"),
         (lambda f: feature(f, "more", dtype="float32", shape=[1]), "unknown column 'more'"),
+        (lambda f: changed(f, data_path="x" * 300), "xxx': no such file"),
+        (lambda f: changed(f, video_path="x" * 300), "xxx': no such file"),
         (lambda f: (f / DATA).unlink(), "file-000.parquet': no such file"),
         (lambda f: (f / DATA).write_bytes((f / DATA).read_bytes()[:-40]), "no readable Parquet file"),
         (lambda f: (f / EPISODES).unlink(), "no Parquet file in it, but 2 episodes in info.json"),
@@ -156,6 +165,14 @@ Damage = Callable[[Path], object]
         (lambda f: column(f, DATA, "observation.state", [[0.0, 1e300]] * 6), "states (episode): wanted finite"),
         (lambda f: column(f, DATA, "episode_index", [0, 1, 0, 1, 0, 1]), "wanted all of them, one after another"),
         (lambda f: column(f, DATA, "episode_index", [0] * 6), "episode 0: 6 of its 3 rows"),
+        (
+            lambda f: another_column(f, "next.success", [float("nan")] * 6),
+            "column 'next.success' of episode 0: wanted finite",
+        ),
+        (
+            lambda f: column(f, DATA, "intervention", [0.0, float("nan")] * 3),
+            "column 'intervention' of episode 0: wanted finite",
+        ),
         (lambda f: column(f, DATA, "task_index", [7] * 6), "task 7 of episode 0 is not in meta/tasks.parquet"),
         (lambda f: column(f, DATA, "task_index", [0.0, 0.5] * 3), "column 'task_index': wanted whole numbers"),
         (
@@ -176,6 +193,18 @@ def test_a_damaged_dataset_is_refused_in_one_line(ours: Path, damage: Damage, sa
         read(ours)
     assert said in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(("version", "is_converted"), [("v2.1", True), ("v2.0", False), ("v1.6", False)])
+def test_what_lerobot_converts_is_converted_where_it_is_and_not_on_the_hub(
+    ours: Path, version: str, is_converted: bool
+) -> None:
+    """Its script converts v2.1 alone; without --root it takes the Hub's dataset, and by itself it replaces that one."""
+    changed(ours, codebase_version=version)
+    with pytest.raises(BadInput) as refused:
+        read(ours)
+    words = str(refused.value).split()
+    assert ({"--root=FOLDER", "--push-to-hub=false"} <= {*words}) == is_converted
 
 
 @pytest.mark.parametrize(
