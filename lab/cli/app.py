@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Callable
+from errno import ENAMETOOLONG
 from functools import partial, wraps
 from importlib import import_module
 from io import TextIOWrapper
@@ -12,7 +13,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from lab.cli.families import CommandOfFamilies
 from lab.cli.output import begin, end, fail, silence, write
-from lab.errors import LabError, out_of_memory, shortened
+from lab.errors import BadInput, LabError, out_of_memory, shortened
 from lab.lazy import rich
 from lab.plugins.family import blame
 from lab.version import __version__
@@ -287,6 +288,11 @@ def guarded(function: Callable[..., None]) -> Callable[..., None]:
             silence()
             end("", 1)
         except OSError as error:  # a full disk, a folder that was removed meanwhile
+            if error.errno == ENAMETOOLONG:
+                end(
+                    f"path '{shortened(error.filename or error)}': its name is longer than a file's may be",
+                    BadInput.exit_code,
+                )
             end(str(error), 1)
         except Exception as error:
             why = blame(error) or out_of_memory(error)

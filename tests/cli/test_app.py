@@ -207,6 +207,15 @@ def test_what_the_system_refuses_is_one_line(lab: Lab, monkeypatch: pytest.Monke
     assert (ran.code, ran.out, ran.err) == (1, "", "lab: [Errno 28] No space left on device: 'x'\n")
 
 
+@pytest.mark.parametrize(
+    "words", ["mentor {}", "mentor . --report {}/x.html", "clone grasp --dataset {}", "run {}/x.toml"]
+)
+def test_a_longer_name_than_a_file_can_have_is_a_wrong_input(lab: Lab, folder: Path, words: str) -> None:
+    ran = lab(*words.format("x" * 300).split())
+    assert (ran.code, ran.out, ran.err.count("\n")) == (2, "", 1)
+    assert "xxxxxxxxxx" in ran.err
+
+
 def test_what_was_told_is_the_only_document(lab: Lab, folder: Path) -> None:
     """A lesson that fails to reach its goal has its own document, and no second one for the error."""
     (folder / "w.txt").write_text("S" + "." * 30 + "G\n")
