@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from lab.learning.selection import SELECTIONS
     from lab.learning.settings import USUAL
     from lab.learning.updates import UPDATES
+    from lab.mentor.conformal import check_share
     from lab.mentor.doubts import DOUBTS, check_rule
     from lab.mentor.mentor import Mentor, parted
     from lab.mentor.takeovers import RULES, RulesCompared, rules_compared
@@ -220,6 +221,7 @@ TABLE = {
     "lab.learning.selection": ("SELECTIONS",),
     "lab.learning.settings": ("USUAL",),
     "lab.learning.updates": ("UPDATES",),
+    "lab.mentor.conformal": ("check_share",),
     "lab.mentor.doubts": ("DOUBTS", "check_rule"),
     "lab.mentor.mentor": ("Mentor", "parted"),
     "lab.mentor.takeovers": ("RULES", "RulesCompared", "rules_compared"),

@@ -1,5 +1,6 @@
 """`lab mentor`: when a robot's policy should ask, from its recorded episodes."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -33,6 +34,13 @@ def mentor(
         Path | None,
         typer.Option("--rollouts", help="For --keep: a dataset of the policy's rollouts without a teacher."),
     ] = None,
+    failed: Annotated[
+        str | None,
+        typer.Option(
+            "--failed",
+            help="For --keep: the episodes of --rollouts that failed, such as 0,7, or none; where the dataset does not say.",
+        ),
+    ] = None,
     rule: Annotated[
         str | None,
         typer.Option(
@@ -51,6 +59,9 @@ def mentor(
     """
     if (keep is None) != (rollouts is None):
         raise BadInput("--keep and --rollouts: wanted both, or neither")
+    if failed is not None and rollouts is None:
+        raise BadInput(f"--failed {shortened(failed)} without --rollouts: it says which of these episodes failed")
+    deferred.check_share("share", false_alarms, "--false-alarms")
     if rule is not None:
         deferred.check_rule(rule, "--rule")
         if keep is None and not deferred.DOUBTS.is_added(rule):
@@ -63,7 +74,8 @@ def mentor(
             raise BadInput(f"file '{path}' ({option}): wanted a file in a folder that exists")
     recording = deferred.read_recording(dataset)
     if keep is not None and rollouts is not None:
-        show(_kept(recording, rollouts, keep, rule or "distance", false_alarms, seed), as_json, _kept_summary)
+        alone = _rolled_out(rollouts, failed, recording)
+        show(_kept(recording, alone, keep, rule or "distance", false_alarms, seed), as_json, _kept_summary)
         return
     with deferred.counting(console(), "rules compared") as progress:
         done = iter(range(len(rules)))
@@ -81,8 +93,8 @@ def mentor(
     show(document, as_json, lambda _: _summary(compared, report))
 
 
-def _kept(recording: Any, rollouts: Path, keep: Path, rule: str, false_alarms: float, seed: int) -> dict[str, Any]:
-    """The document of a mentor, after it was learned, calibrated and written."""
+def _rolled_out(rollouts: Path, failed: str | None, recording: Any) -> Any:
+    """The rollouts of the policy, and which of them failed, if that was said."""
     alone = deferred.read_recording(rollouts)
     for name in ("fps", "state_names", "action_names"):
         shown, rolled = getattr(recording, name), getattr(alone, name)
@@ -90,6 +102,22 @@ def _kept(recording: Any, rollouts: Path, keep: Path, rule: str, false_alarms: f
             raise BadInput(
                 f"--rollouts '{rollouts}': {name} {shortened(rolled)}: wanted {shortened(shown)}, as DATASET has"
             )
+    if failed is None:
+        return alone
+    numbers = set[int]()
+    for word in failed.split(",") if failed != "none" else ():
+        if not word.strip().isdecimal() or int(word) >= len(alone.episodes):
+            raise BadInput(
+                f"'{shortened(word)}' (--failed): wanted numbers of episodes from 0 to {len(alone.episodes) - 1}, such as 0,7, "
+                "or none"
+            )
+        numbers.add(int(word))
+    marked = [replace(episode, success=number not in numbers) for number, episode in enumerate(alone.episodes)]
+    return replace(alone, episodes=marked)
+
+
+def _kept(recording: Any, alone: Any, keep: Path, rule: str, false_alarms: float, seed: int) -> dict[str, Any]:
+    """The document of a mentor, after it was learned, calibrated and written."""
     learned, others = deferred.parted(rule, alone.episodes)
     made = deferred.Mentor.learn(recording, rule, rollouts=learned, seed=seed)
     made.calibrate(others, false_alarms=false_alarms)

@@ -5,13 +5,13 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, Protocol
 
 import numpy as np
-from annotated_types import Ge, Gt, Lt
+from annotated_types import Ge
 from numpy.typing import NDArray
 
 from lab.cloning.student import EPOCHS, Student
 from lab.errors import BadInput, check_value
-from lab.mentor.conformal import Promise
-from lab.mentor.doubts import UNCALIBRATED, check_rule
+from lab.mentor.conformal import Promise, check_share
+from lab.mentor.doubts import DOUBTS, UNCALIBRATED, check_rule
 from lab.mentor.mentor import Mentor, Question, parted
 from lab.recordings.episode import Episode, Recording
 
@@ -54,7 +54,7 @@ class CloningOptions:
 
     def __post_init__(self) -> None:
         check_rule(self.rule, "clone")
-        check_value("false_alarms", self.false_alarms, Annotated[float, Gt(0), Lt(1)], "clone")
+        check_share("false_alarms", self.false_alarms, "clone")
         check_value("rounds", self.rounds, Annotated[int, Ge(0)], "clone")
         check_value("seed", self.seed, Annotated[int, Ge(0)], "clone")
         for name in (
@@ -77,7 +77,9 @@ class Measured:
     successes (e,): of the episodes without a teacher. questions, corrected_steps: so far. warned: of the failed episodes, those
     in which the mentor would have asked, and false_alarms: of the others; lead_steps: from the first question to the end of
     each failed episode that was warned of. promise: of the mentor's threshold; None if too few rollouts succeeded to promise it.
-    helped, judged: takeovers, by the mentor's judge; rejected: whether it asks no more.
+    helped, judged: takeovers, by the mentor's judge; rejected: whether it asks no more. rule: of the mentor in this round, which
+    is "distance" where the session's rule had nothing to learn from; "" in what was kept before it was noted.
+    Raises BadInput for numbers that cannot be.
     """
 
     round: int
@@ -91,6 +93,18 @@ class Measured:
     helped: int
     judged: int
     rejected: bool
+    rule: str = ""
+
+    def __post_init__(self) -> None:
+        failures = self.successes.count(False)
+        most = {"warned": failures, "false_alarms": len(self.successes) - failures, "helped": self.judged}
+        if not self.successes:
+            raise BadInput("successes: none: wanted one episode or more")
+        for name in ("round", "questions", "corrected_steps", "judged", *most):
+            if not 0 <= (value := getattr(self, name)) <= most.get(name, value):
+                raise BadInput(f"{name} {value}: wanted 0 {f'to {most[name]}' if name in most else 'or more'}")
+        if len(self.lead_steps) != self.warned:
+            raise BadInput(f"lead_steps of {len(self.lead_steps)} failures: wanted those of {self.warned}")
 
     @property
     def success(self) -> float:
@@ -191,11 +205,10 @@ def _mentor(
         return mentor
     seeds = seeds_for(options, CALIBRATING, options.calibrated, number)
     rollouts = [student.planned(roll_out(student, seed)) for seed in seeds]
-    learned, others = parted(options.rule, rollouts)
-    try:
-        mentor = Mentor.learn(recording, options.rule, rollouts=learned, seed=options.seed)
-    except BadInput:  # the failure predictor, when all rollouts or none failed
-        mentor = Mentor.learn(recording, "distance", seed=options.seed)
+    rule, (learned, others) = options.rule, parted(options.rule, rollouts)
+    if DOUBTS[rule].make.learns_from_rollouts and len({episode.success for episode in learned}) < 2:
+        rule = "distance"  # all rollouts failed, or none
+    mentor = Mentor.learn(recording, rule, rollouts=learned, seed=options.seed)
     well = [episode for episode in others if episode.success]
     if (len(well) + 1) * options.false_alarms >= 1.0:
         return mentor.calibrate(others, false_alarms=options.false_alarms)
@@ -282,4 +295,5 @@ def _measure(roll_out: RollsOut, session: Cloning, options: CloningOptions) -> M
         judge.helped,
         judge.judged,
         judge.rejects,
+        mentor.rule,
     )

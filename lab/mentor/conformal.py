@@ -41,7 +41,7 @@ def few_false_alarms(peaks: Sequence[float], share: float) -> Promise:
 
     peaks (n,): the largest doubt of each successful episode. Raises BadInput for a share that n episodes cannot promise.
     """
-    _check(share, "false_alarms")
+    check_share("false_alarms", share, "calibrate")
     n = len(peaks)
     rank = ceil((n + 1) * (1.0 - share) - _SLACK)
     if rank > n:
@@ -56,7 +56,7 @@ def many_caught(peaks: Sequence[float], share: float) -> Promise:
     peaks (n,): the largest doubt of each failed episode while there was still time. Raises BadInput for a share that n episodes
     cannot promise.
     """
-    _check(share, "caught")
+    check_share("caught", share, "calibrate")
     n = len(peaks)
     rank = floor((n + 1) * (1.0 - share) + _SLACK)
     if rank < 1:
@@ -71,8 +71,9 @@ def _above(n: int, rank: int, level: float) -> tuple[float, float]:
     return (n + 1 - rank) / (n + 1), float(scipy.special.betaincinv(n + 1 - rank, rank, level))
 
 
-def _check(share: float, name: str) -> None:
-    check_value(name, share, Annotated[float, Gt(0), Lt(1)], "calibrate")
+def check_share(name: str, share: float, where: str) -> None:
+    """Raises BadInput, which names `where` it came from, unless a share is above 0 and below 1."""
+    check_value(name, share, Annotated[float, Gt(0), Lt(1)], where)
 
 
 def _too_few(n: int, least: int, what: str, which: str) -> BadInput:

@@ -159,7 +159,8 @@ class ChunkDisagreement(Doubt):
     def __call__(self, step: Step) -> float:
         if step.chunk is None or len(step.chunk) < 2:
             raise BadInput(
-                "rule 'chunk' (mentor): the policy tells no chunk: wanted chunk=, two or more planned actions"
+                "rule 'chunk' (mentor): the policy does not tell its plan: wanted chunk=, two or more planned actions; in a "
+                "dataset the feature 'chunk'"
             )
         before, self._before = self._before, step.chunk
         if before is None:
@@ -320,6 +321,20 @@ def doubted(doubt: Doubt, step: Step) -> float:
     if isinstance(value, bool) or not isinstance(value, Real) or value != value:  # no number is above or below nan
         raise BadInput(f"the rule {type(doubt).__name__} returned {shortened(repr(value))}: wanted a number")
     return float(value)
+
+
+def learned_by(rule: str, demonstrated: Demonstrated, rollouts: Sequence[Episode], rng: np.random.Generator) -> Arrays:
+    """What a rule learns. Raises BadInput if a rule of somebody's own returns other than arrays of finite numbers by name."""
+    learned: Any = DOUBTS[rule].make.learned(demonstrated, rollouts, rng)
+    try:
+        arrays = {str(name): np.asarray(array, np.float64) for name, array in learned.items()}
+    except (AttributeError, TypeError, ValueError):
+        arrays = {"": np.array(np.nan)}
+    if not all(np.isfinite(array).all() for array in arrays.values()):
+        raise BadInput(
+            f"rule '{rule}' (mentor): what it learned is {shortened(repr(learned))}: wanted arrays of finite numbers, by name"
+        )
+    return arrays
 
 
 def steps_of(demonstrated: Demonstrated, episode: Episode) -> list[Step]:

@@ -11,7 +11,7 @@ from lab.errors import BadInput, counted
 from lab.files import read_limited, write_whole
 from lab.mentor.conformal import Promise, few_false_alarms, many_caught
 from lab.mentor.demonstrated import Array, Demonstrated
-from lab.mentor.doubts import DOUBTS, UNCALIBRATED, Arrays, Doubt, Step, check_rule, doubted, doubts_of
+from lab.mentor.doubts import DOUBTS, UNCALIBRATED, Arrays, Doubt, Step, check_rule, doubted, doubts_of, learned_by
 from lab.mentor.judge import Judge
 from lab.mentor.mentor_file import Kept, decode, encode
 from lab.recordings.episode import Episode, Recording
@@ -102,7 +102,7 @@ class Mentor:
         threshold = 0.0 if rule in UNCALIBRATED else float("inf")
         for number, episode in enumerate(seen):
             _check_widths(episode, number, recording.state_names, recording.action_names)
-        arrays = DOUBTS[rule].make.learned(demonstrated, seen, rng)
+        arrays = learned_by(rule, demonstrated, seen, rng)
         mentor = cls(rule, demonstrated, arrays, recording.state_names, recording.action_names, threshold)
         learned = (*recording.episodes, *(seen if DOUBTS[rule].make.learns_from_rollouts else ()))
         mentor._learned = {episode.states.tobytes() for episode in learned}
@@ -133,7 +133,10 @@ class Mentor:
             if episode.states.tobytes() in self._learned:
                 raise BadInput(f"rollout {number} (calibrate): the mentor has learned from it: wanted other ones")
         if given and all(episode.success is None for episode in given):
-            raise BadInput("rollouts (calibrate): of none is it known whether it succeeded: wanted a success for each")
+            raise BadInput(
+                "rollouts (calibrate): of none is it known whether it succeeded: wanted a success for each, in a dataset by its "
+                "feature 'next.success'; lab mentor takes --failed, too"
+            )
         chosen = [e for e in given if not e.corrected.any() and e.success is (caught is None)]
         if false_alarms is not None:
             self.promise = few_false_alarms([self.peak(episode) for episode in chosen], false_alarms)

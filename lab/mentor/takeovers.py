@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from lab.errors import BadInput
 from lab.lazy import scipy
-from lab.mentor.conformal import few_false_alarms
+from lab.mentor.conformal import check_share, few_false_alarms
 from lab.mentor.demonstrated import Array, Demonstrated, shows_what_to_do
-from lab.mentor.doubts import DOUBTS, check_rule, doubts_of
+from lab.mentor.doubts import DOUBTS, check_rule, doubts_of, learned_by
 from lab.recordings.episode import Episode, Recording
 
 FOLDS = 5  # an episode's doubt is measured by a mentor that learned from the other folds
@@ -81,6 +81,7 @@ def rules_compared(
     """
     for name in rules:
         check_rule(name, "rules")
+    check_share("false_alarms", false_alarms, "compare")
     episodes, window = recording.episodes, max(1, round(window_s * recording.fps))
     takeovers = sum(len(episode.takeovers()) for episode in episodes)
     if not takeovers:
@@ -129,9 +130,8 @@ def _out_of_fold(episodes: Sequence[Episode], name: str, window: int, seed: int)
         others = [episode for episode, of in zip(episodes, fold_of, strict=True) if of != fold]
         rng = np.random.default_rng([seed, fold])
         demonstrated = Demonstrated.of(others, rng, lambda episode: _shown(episode, window))
-        make = DOUBTS[name].make
         pieces = [episode.part(*stretch) for episode in others for stretch in stretches(episode)]
-        doubt = make(demonstrated, make.learned(demonstrated, pieces, rng))
+        doubt = DOUBTS[name].make(demonstrated, learned_by(name, demonstrated, pieces, rng))
         for number in np.flatnonzero(fold_of == fold).tolist():
             doubts[number] = doubts_of(doubt, demonstrated, episodes[number])
     return doubts

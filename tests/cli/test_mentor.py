@@ -1,6 +1,7 @@
 """`lab mentor`, on recordings of a cart."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,9 @@ def datasets(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     for name, held in episodes.items():
         write(Recording(1, "cart", ("x",), ("dx",), held), folder / name)
     write(Recording(1, "cart", ("y",), ("dx",), episodes["alone"]), folder / "other")
-    return {name: folder / name for name in (*episodes, "other")}
+    unknown = [replace(episode, success=None) for episode in episodes["alone"]]
+    write(Recording(1, "cart", ("x",), ("dx",), unknown), folder / "unknown")
+    return {name: folder / name for name in (*episodes, "other", "unknown")}
 
 
 def test_it_compares_the_rules(lab: Any, datasets: dict[str, Path], tmp_path: Path) -> None:
@@ -77,10 +80,50 @@ def test_it_keeps_a_mentor_with_its_promise(lab: Any, datasets: dict[str, Path],
     assert "20" in lab(*words).out
 
 
+def test_who_watched_the_rollouts_says_which_failed(lab: Any, datasets: dict[str, Path], tmp_path: Path) -> None:
+    """A recording of a real robot rarely marks it; of nine rollouts, those number 0 and 8 failed here."""
+    words = ["mentor", *map(str, (datasets["shown"], "--rollouts", datasets["unknown"], "--false-alarms", 0.2))]
+    said = [lab(*words, "--keep", str(tmp_path / "m"), "--failed", failed, "--json") for failed in ("0, 8", "none")]
+    assert [ran.json["successes"] for ran in said] == [7, 9]
+    refused = lab(*words, "--keep", str(tmp_path / "n"))
+    assert (refused.code, "--failed" in refused.err, "next.success" in refused.err) == (2, True, True)
+
+
+FAULTY = """
+import lab
+
+class Learns(lab.Doubt):
+    @classmethod
+    def learned(cls, demonstrated, rollouts, rng):
+        return {"a": "text"}
+
+    def __call__(self, step):
+        return 1.0
+"""
+
+
+@pytest.mark.usefixtures("own_code")
+def test_a_rule_that_learns_no_arrays_is_refused_before_anything_is_kept(
+    lab: Any, datasets: dict[str, Path], tmp_path: Path
+) -> None:
+    (tmp_path / "bad.py").write_text(FAULTY)
+    words = map(str, (datasets["shown"], "--rollouts", datasets["alone"], "--keep", tmp_path / "m"))
+    ran = lab("mentor", *words, "--rule", f"{tmp_path}/bad.py:Learns")
+    assert ran.code == 2
+    assert "'text'" in ran.err
+    assert not (tmp_path / "m").exists()
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [
         (["nothing"], "nothing"),
+        (["nothing", "--false-alarms", "7"], "share 7.0 (--false-alarms)"),
+        (["nothing", "--false-alarms", "nan"], "share nan (--false-alarms)"),
+        (["{taken}", "--failed", "1"], "--failed 1 without --rollouts"),
+        (["{shown}", "--rollouts", "{alone}", "--keep", "m", "--failed", "1,9"], "'9' (--failed): wanted numbers"),
+        (["{shown}", "--rollouts", "{alone}", "--keep", "m", "--failed", "-1"], "'-1' (--failed)"),
+        (["{shown}", "--rollouts", "{alone}", "--keep", "m", "--failed", ""], "'' (--failed)"),
         (["{shown}"], "takeovers"),
         (["{taken}", "--keep", "x"], "--rollouts"),
         (["{taken}", "--rule", "failure"], "--keep"),

@@ -15,10 +15,14 @@ from lab.cloning.rounds import (
     Asking,
     Cloning,
     CloningOptions,
+    Measured,
     cloned,
     seeds_for,
 )
 from lab.cloning.student import Student
+from lab.errors import BadInput
+from lab.learning.members import Member
+from lab.mentor.doubts import DOUBTS, Doubt, Step
 from lab.mentor.mentor import Mentor
 from lab.recordings.episode import Episode, Recording
 from tests.cloning.conftest import RollOut
@@ -92,6 +96,57 @@ def test_a_teacher_who_misleads_is_asked_no_more(roll_out: RollOut, shown: Recor
     assert last.measured[-1].rejected
     assert last.measured[-1].helped < last.measured[-1].judged / 2
     assert last.questions < 4 * 20
+
+
+@pytest.mark.parametrize("success", [True, False])
+def test_what_cannot_be_learned_from_the_rollouts_is_replaced_and_told(
+    success: bool, roll_out: RollOut, shown: Recording
+) -> None:
+    """Of rollouts that all end alike a predictor of failure learns nothing."""
+
+    def alike(*args: Any, **kwargs: Any) -> Episode:
+        return replace(roll_out(*args, **kwargs), success=success)
+
+    sessions = [next(iter(cloned(alike, shown, replace(FEW, rule=rule)))) for rule in ("failure", "distance")]
+    assert [session.measured[0].rule for session in sessions] == ["distance", "distance"]
+
+
+class Broken(Doubt):
+    """Learns nothing."""
+
+    @classmethod
+    def learned(cls, *_: Any) -> Any:
+        raise BadInput("this rule is broken")
+
+    def __call__(self, step: Step) -> float:
+        return 0.0
+
+
+def test_a_broken_rule_of_ones_own_is_not_replaced(
+    roll_out: RollOut, shown: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(DOUBTS, "broken", Member(Broken, "is broken"))
+    with pytest.raises(BadInput, match="this rule is broken"):
+        next(iter(cloned(roll_out, shown, replace(FEW, rule="broken"))))
+
+
+GOOD = Measured(1, (True, False), 3, 12, 1, 0, (9,), None, 1, 2, False)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"successes": ()}, "successes: none"),
+        ({"questions": -4}, "questions -4: wanted 0 or more"),
+        ({"warned": 2}, "warned 2: wanted 0 to 1"),
+        ({"false_alarms": 2}, "false_alarms 2: wanted 0 to 1"),
+        ({"helped": 3}, "helped 3: wanted 0 to 2"),
+        ({"lead_steps": ()}, "lead_steps of 0 failures: wanted those of 1"),
+    ],
+)
+def test_a_round_has_numbers_that_can_be(wrong: dict[str, Any], said: str) -> None:
+    with pytest.raises(BadInput, match=said):
+        replace(GOOD, **wrong)
 
 
 def test_a_session_knows_its_parts(roll_out: RollOut, shown: Recording) -> None:
