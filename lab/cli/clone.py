@@ -111,6 +111,8 @@ def clone(
     """
     if (skill is None) == (resume is None):
         raise BadInput("wanted a skill, or --resume DIR; one of the two")
+    if false_alarms is not None and rule in UNPROMISED:
+        raise BadInput(f"--false-alarms beside --rule {rule}: no rollouts set when it asks: remove --false-alarms")
     for option, given in (("--demonstrations", demonstrations), ("--demonstrator", demonstrator)):
         if dataset is not None and given is not None:
             raise BadInput(f"{option} beside --dataset: a session begins with all that the dataset shows: remove one")
@@ -167,7 +169,7 @@ def clone(
         with _person(teacher, port, kept) as person:
             for session in deferred.rounds_of(kept, folder, person, shown):
                 measured = session.measured
-                console().print(_line(measured[-1]), markup=False)
+                console().print(_line(measured[-1], kept.options.rule), markup=False)
     finally:
         kept.problem.close()
     if plot is not None:
@@ -216,12 +218,13 @@ def _person(teacher: str, port: int, kept: Any) -> "Iterator[deferred.PersonRoll
         yield None
 
 
-def _line(measured: Any) -> str:
+def _line(measured: Any, rule: str) -> str:
     failures = measured.successes.count(False)
     successes = len(measured.successes) - failures
+    by = f", by '{measured.rule}'," if measured.rule not in ("", rule) else ""
     return (
         f"round {measured.round}: {100 * measured.success:.0f} % of {counted(len(measured.successes), 'episode')} after "
-        f"{counted(measured.questions, 'question')}; its mentor doubts in {measured.warned} of "
+        f"{counted(measured.questions, 'question')}; its mentor{by} doubts in {measured.warned} of "
         f"{counted(failures, 'failure')} and in {measured.false_alarms} of {counted(successes, 'success')}"
     )
 
@@ -245,6 +248,13 @@ def _summary(document: dict[str, Any]) -> "rich.console.RenderableType":
     below = [f"{document['skill']} of {document['task']}, asking by '{document['rule']}'"]
     if document["rule"] not in UNPROMISED and any(one["promise"] is None for one in document["rounds"]):
         below.append("without a promise: too few of the rollouts that calibrate the mentor succeeded")
+    others = [one for one in document["rounds"] if one["rule"] not in ("", document["rule"])]
+    for other in sorted({one["rule"] for one in others}):
+        numbers = ", ".join(str(one["round"]) for one in others if one["rule"] == other)
+        below.append(
+            f"in {'round' if ',' not in numbers else 'rounds'} {numbers} by '{other}', because '{document['rule']}' learns from "
+            "rollouts of which some fail and some succeed"
+        )
     if any(one["rejected"] for one in document["rounds"]):
         below.append("it asks no more: the takeovers have not helped")
     if document["out"]:

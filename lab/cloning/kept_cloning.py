@@ -2,8 +2,8 @@
 
 import json
 import re
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from shutil import rmtree
 
@@ -19,22 +19,28 @@ from lab.recordings.episode import Episode, Recording
 from lab.recordings.lerobot_read import read
 from lab.recordings.lerobot_write import write
 from lab.tasks.record import read_json
+from lab.tasks.task import hash_of
+from lab.tasks.task_file import load, whole_path
 
 SESSION, MEASURED = "session.json", "measured.json"
 DEMONSTRATIONS, CORRECTIONS, BEGUN = "demonstrations", "corrections", "begun-"
 STUDENT, MENTOR = "student.safetensors", "mentor.safetensors"
 DEMONSTRATORS = ("scripted", "person", "dataset")
 _EPISODE = re.compile(r"(\d{1,6})-(\d{1,6})")  # place and questions of an episode of what was interrupted
-_WANTED = "a session of `lab clone`"
+_WANTED = "wanted a session of `lab clone`"
 
 
 @dataclass(frozen=True)
 class KeptOptions:
-    """What a session was begun with. demonstrator: who gives the demonstrations, one of DEMONSTRATORS."""
+    """What a session was begun with. demonstrator: who gives the demonstrations, one of DEMONSTRATORS.
+
+    task_hash: of its task when it was begun, which a folder keeps; "" for none.
+    """
 
     problem: SkillProblem
     options: CloningOptions
     demonstrator: str = "scripted"
+    task_hash: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
         if self.demonstrator not in DEMONSTRATORS:
@@ -51,8 +57,17 @@ def check_new(folder: Path) -> None:
 
 
 def options_of(folder: Path) -> KeptOptions:
-    """What the session in a folder was begun with. Raises BadInput if it holds none."""
-    return read_json(folder / SESSION, KeptOptions, f"session '{folder}' (--resume)", _WANTED)
+    """What the session in a folder was begun with. Raises BadInput if it holds none, or its task has changed since."""
+    which = f"session '{folder}' (--resume)"
+    kept = read_json(folder / SESSION, KeptOptions, which, _WANTED)
+    try:
+        now = hash_of(load(kept.problem.task))
+        kept.problem.env  # noqa: B018  # its skill and noise are checked
+    except BadInput as error:
+        raise BadInput(f"{which}: {error}") from None
+    if kept.task_hash not in ("", now):
+        raise BadInput(f"{which}: its task '{kept.problem.task}' has changed since it was begun")
+    return kept
 
 
 def rounds_of(
@@ -75,11 +90,13 @@ def rounds_of(
         yield from cloned(roll_out, shown, options, hears=Hears(question))
         return
     if not (folder / SESSION).exists():
-        _write(folder / SESSION, json.dumps(asdict(kept), indent=1))
+        problem = replace(kept.problem, task=whole_path(kept.problem.task) or "")
+        begun = replace(kept, problem=problem, task_hash=hash_of(load(kept.problem.task)))
+        _write(folder / SESSION, json.dumps(asdict(begun), indent=1))
     if not (folder / DEMONSTRATIONS).is_dir():
         write(demonstrations or _demonstrated(kept, folder, person), folder / DEMONSTRATIONS)
     rmtree(folder / f"{BEGUN}{DEMONSTRATIONS}", ignore_errors=True)
-    shown = read(folder / DEMONSTRATIONS)
+    shown = problem.taken(read(folder / DEMONSTRATIONS), f"'{folder / DEMONSTRATIONS}'")
     session = loaded(folder, shown)
     known = 0
     if session is not None:
@@ -106,7 +123,7 @@ def _demonstrated(kept: KeptOptions, folder: Path | None, person: PersonRollouts
     if kept.demonstrator == "dataset":
         raise BadInput("the demonstrations of this session came from a dataset, and are missing: begin another session")
     begun = None if folder is None else folder / f"{BEGUN}{DEMONSTRATIONS}"
-    shown = [] if begun is None else _begun(begun)
+    shown = [] if begun is None else _begun(begun, kept.problem.recorded([]))
     if len(shown) < kept.options.demonstrations:
         if person is None:
             raise BadInput(
@@ -128,8 +145,10 @@ def loaded(folder: Path, demonstrations: Recording) -> Cloning | None:
     measured, corrections = list[Measured](), list[Episode]()
     while (of_round := _of_round(folder, len(measured))).is_dir():
         measured.append(read_json(of_round / MEASURED, Measured, f"round '{of_round}'", _WANTED))
+        if measured[-1].round != len(measured) - 1:
+            raise BadInput(f"round '{of_round}': it holds round {measured[-1].round}: {_WANTED}")
         if (of_round / CORRECTIONS).is_dir():
-            corrections += read(of_round / CORRECTIONS).episodes
+            corrections += _episodes(of_round / CORRECTIONS, demonstrations)
     later = [
         path.name for path in folder.glob("round-*") if path.name[6:].isdigit() and int(path.name[6:]) >= len(measured)
     ]
@@ -140,19 +159,35 @@ def loaded(folder: Path, demonstrations: Recording) -> Cloning | None:
     if not measured:
         return None
     last = _of_round(folder, len(measured) - 1)
-    mentor = Mentor.load(last / MENTOR)
+    mentor, student = Mentor.load(last / MENTOR), Student.load(last / STUDENT)
+    wanted = len(demonstrations.state_names), len(demonstrations.action_names)
+    for file, widths in ((MENTOR, (len(mentor.state_names), len(mentor.action_names))), (STUDENT, student.widths)):
+        if widths != wanted:
+            raise BadInput(
+                f"'{last / file}': of {widths[0]} states and {widths[1]} actions: wanted {wanted[0]} and {wanted[1]}, as "
+                "demonstrated"
+            )
     mentor.judge = Judge(measured[-1].helped, measured[-1].judged, measured[-1].rejected)
-    student, begun = Student.load(last / STUDENT), _begun(folder / f"{BEGUN}{len(measured)}")
+    begun = _begun(folder / f"{BEGUN}{len(measured)}", demonstrations)
     return Cloning(demonstrations, student, mentor, corrections, measured, measured[-1].questions, begun)
 
 
-def _begun(folder: Path) -> list[Corrected]:
+def _episodes(folder: Path, demonstrations: Recording) -> Sequence[Episode]:
+    """The episodes in a dataset of the session. Raises BadInput if they have not the demonstrations' states and actions."""
+    kept = read(folder)
+    for name in ("state_names", "action_names"):
+        if getattr(kept, name) != getattr(demonstrations, name):
+            raise BadInput(f"'{folder}': of other {name} than '{DEMONSTRATIONS}': {_WANTED}")
+    return kept.episodes
+
+
+def _begun(folder: Path, demonstrations: Recording) -> list[Corrected]:
     """The kept episodes of a round, or of demonstrations, that were interrupted, in their order."""
     if not folder.is_dir():
         return []
     found = [_EPISODE.fullmatch(path.name) for path in folder.iterdir()]
     kept = sorted((int(name[1]), int(name[2]), name[0]) for name in found if name)
-    return [Corrected(place, questions, read(folder / name).episodes[0]) for place, questions, name in kept]
+    return [Corrected(place, questions, _episodes(folder / name, demonstrations)[0]) for place, questions, name in kept]
 
 
 def _keep(folder: Path, problem: SkillProblem, session: Cloning, known: int) -> None:

@@ -71,6 +71,11 @@ class Student:
         layers = [np.stack(layer) for layer in zip(*networks, strict=True)]
         return cls(middle, scale, layers[: len(HIDDEN) + 1], layers[len(HIDDEN) + 1 :])
 
+    @property
+    def widths(self) -> tuple[int, int]:
+        """How many numbers a state has, and an action."""
+        return len(self.middle), self.biases[-1].shape[1] // self.chunk
+
     def plan(self, states: Any) -> Array:
         """The actions (..., h, k) that it would take from states (..., d) on."""
         states = np.asarray(states, np.float64)

@@ -176,7 +176,8 @@ def controlled_skill(task: str, skill: str, layout_seed: int) -> ControlledSkill
     skills = SkillSet.of(loaded, order).skills
     name = next((own for own, found in skills.items() if skill in (own, found.subtask)), None)
     if name is None:
-        raise unknown("skill", skill, skills, f"task '{loaded.name}'")
+        subtasks = dict.fromkeys(found.subtask for found in skills.values())
+        raise unknown("skill", skill, (*subtasks, *skills), f"task '{loaded.name}'")
     prepared = prepare(loaded, order, layout_seed, name)
     layout = replace(lay_out(loaded, order, layout_seed), parts=())
     return ControlledSkill(prepared.task, layout, prepared.skillset.skills[name])

@@ -1,6 +1,5 @@
 """The options of `lab run` that decide what comes of it: typed by a person, or read from the head of a run's journal."""
 
-import hashlib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -13,10 +12,10 @@ from lab.production import deferred
 from lab.production.cyclic_order import check_parts, mix_of
 from lab.production.run_journal import RunBegan, RunJournal, read_run
 from lab.sequencing import SEQUENCERS, check_method
-from lab.tasks.task import Task
-from lab.tasks.task_file import load
+from lab.tasks.task import Task, hash_of
+from lab.tasks.task_file import load, whole_path
 from lab.teaching.kept_session import check_alone, check_named
-from lab.teaching.lesson_options import LessonOptions, SessionOptions, recorded_whole, whole_path
+from lab.teaching.lesson_options import LessonOptions, SessionOptions, recorded_whole
 
 WAYS = (
     "learned",
@@ -134,8 +133,3 @@ def kept_task(folder: Path, where: str) -> tuple[RunOptions, Task]:
     if hash_of(task) != head.task_hash:
         raise BadInput(f"run in '{folder}' ({where}): its task '{options.task}' has changed since it was begun")
     return options, task
-
-
-def hash_of(task: Task) -> str:
-    """A hash (24 hex digits) of all that a task says; a run can be resumed only with the same one."""
-    return hashlib.sha256(task.model_dump_json(exclude_defaults=True).encode()).hexdigest()[:24]

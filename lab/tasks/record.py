@@ -178,9 +178,11 @@ def read_json(path: Path, kind: type[Kept], which: str, wanted: str, most_bytes:
     try:
         return TypeAdapter(kind).validate_json(files.read_limited(path, most_bytes), strict=True)
     except OSError as error:
-        raise BadInput(f"{which}: {error.strerror or error}") from None
+        raise BadInput(f"{which}: '{path.name}': {error.strerror or error}: {wanted}") from None
     except ValidationError as error:
         raise BadInput(f"{which}: {first_fault(error)}: {wanted}") from None
+    except BadInput as error:  # what the record itself refuses
+        raise BadInput(f"{which}: {error}") from None
 
 
 def write_whole(path: Path, text: str) -> None:

@@ -46,6 +46,11 @@ def names_file(word: str) -> bool:
     return word.startswith(RANDOM) or is_path(word) or word in _files()
 
 
+def whole_path(name: str | None) -> str | None:
+    """The absolute path of an existing file; any other name unchanged."""
+    return str(Path(name).absolute()) if name is not None and names_file(name) and isfile(name) else name
+
+
 def is_path(task: str) -> bool:
     """Whether a word for a task, cell or world is a path; the file need not exist."""
     return Path(task).suffix in (".toml", ".txt", *SUFFIXES) or not {"/", os.sep}.isdisjoint(task)

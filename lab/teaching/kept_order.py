@@ -17,9 +17,10 @@ from lab.files import json_of, read_limited
 from lab.sequencing.cell.cell import Cell
 from lab.tasks.instances import InstanceRequest
 from lab.tasks.record import write_whole
+from lab.tasks.task_file import whole_path
 from lab.teaching.kept_inputs import keep_inputs, read_inputs, replaced, version_lines
 from lab.teaching.kept_session import SessionInFolder, check_same, claimed, kept_journal, read_session
-from lab.teaching.lesson_options import SessionOptions, whole_path
+from lab.teaching.lesson_options import SessionOptions
 from lab.toolbox.registry import Toolbox
 from lab.version import __version__
 

@@ -14,7 +14,7 @@ from lab.errors import BadInput
 from lab.files import is_file
 from lab.learning.requests import Ask
 from lab.tasks.record import Learned
-from lab.tasks.task_file import names_file
+from lab.tasks.task_file import whole_path
 from lab.teaching.lesson_plan import MAX_SESSIONS
 
 DEFAULT_ADVISORS = ("expert",)
@@ -51,11 +51,6 @@ class SessionOptions:
                 f"{'.'.join(map(str, finding['loc']))}: {finding['msg']}" for finding in error.errors(include_url=False)
             ]
             raise BadInput(f"{where}: its options are none of lab {cls.command}: {'; '.join(wrong)[:160]}") from None
-
-
-def whole_path(name: str | None) -> str | None:
-    """The absolute path of an existing file; any other name unchanged."""
-    return str(Path(name).absolute()) if name is not None and names_file(name) and is_file(name) else name
 
 
 def recorded_whole(advisor: str) -> str:

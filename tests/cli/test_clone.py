@@ -50,15 +50,32 @@ def test_what_a_person_shows_needs_a_folder(lab: Callable[..., Any]) -> None:
     assert "--out" in ran.err
 
 
+def test_a_session_of_ones_own_task_goes_on_from_another_folder_with_the_same_task(
+    lab: Callable[..., Any], root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "work").mkdir()
+    monkeypatch.chdir(tmp_path / "work")
+    toast = (root / "tasks" / "toast.toml").read_text(encoding="utf-8")
+    Path("mine.toml").write_text(toast, encoding="utf-8")
+    begun = lab("clone", "grasp", "--task", "mine.toml", *SHORT, "--rounds", "0", "--out", "ses", "--json").json
+    monkeypatch.chdir(tmp_path)
+    after = lab("clone", "--resume", "work/ses", "--json").json
+    assert after["rounds"] == begun["rounds"]
+    Path("work/mine.toml").write_text(toast.replace("grip_force_n = 25.0", "grip_force_n = 24.0"), encoding="utf-8")
+    ran = lab("clone", "--resume", "work/ses")
+    assert (ran.code, "has changed since it was begun" in ran.err) == (2, True)
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [
         ([], "--resume"),
         (["grasp", "--rule", "distanc"], "did you mean 'distance'"),
         (["grasp", "--false-alarms", "0"], "false_alarms"),
-        (["grap"], "grap"),
+        (["grasp", "--false-alarms", "0.1", "--rule", "clock"], "--false-alarms beside --rule clock"),
+        (["grap"], "did you mean 'grasp'?"),
         (["grasp", "--task", "toas"], "toas"),
-        (["--resume", "nothing"], "nothing"),
+        (["--resume", "nothing"], "session 'nothing' (--resume): 'session.json': No such file"),
         (["grasp", "--plot", "x.gif"], "x.gif"),
         (["grasp", "--resume", "nothing"], "one of the two"),
         (["grasp", "--dataset", "nothing"], "nothing"),

@@ -10,12 +10,13 @@ from lab.errors import BadInput
 from lab.production.recorder import Recorder
 from lab.production.run_film import RunFilm, by_hand_s
 from lab.production.run_journal import Commanded, Moved, RunBegan, RunJournal
-from lab.production.run_options import RunOptions, hash_of
+from lab.production.run_options import RunOptions
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.scene.places import Layout
 from lab.sim.scene.scene import Scene
 from lab.sim.world import TIME_STEP, World
 from lab.skills.camera_grids import overhead_camera
+from lab.tasks.task import hash_of
 from lab.tasks.task_file import load
 from lab.vision import Image
 
