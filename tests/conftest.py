@@ -16,6 +16,9 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from hypothesis import settings
 
+from lab.plugins import code_file
+from lab.plugins.family import Family
+
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
     from websockets.sync.client import ClientConnection
@@ -115,6 +118,22 @@ def _ctrl_c_is_heard() -> Iterator[None]:
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
+
+
+@pytest.fixture(autouse=True)
+def _own_members_are_gone_afterwards(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """What a test adds to the families of gates, rules and so on, from a file or by hand, no other test finds there."""
+    added, adopted = list[tuple[Family[Any], str]](), Family.adopted
+
+    def noted(family: Family[Any], name: str, thing: Any, source: str) -> None:
+        adopted(family, name, thing, source)
+        added.append((family, name))
+
+    monkeypatch.setattr(Family, "adopted", noted)
+    monkeypatch.setattr(code_file, "_files", {})
+    yield
+    for family, name in added:
+        family.pop(name, None)
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,5 @@
 """`lab mentor`, on recordings of a cart."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -8,9 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lab.mentor.doubts import DOUBTS
 from lab.mentor.mentor import Mentor
-from lab.plugins import code_file
 from lab.recordings.episode import Episode, Recording
 from lab.recordings.lerobot_write import write
 
@@ -47,17 +44,6 @@ def test_it_compares_the_rules(lab: Any, datasets: dict[str, Path], tmp_path: Pa
     assert "distance" in lab("mentor", str(datasets["taken"]), "--window", "2").out
 
 
-@pytest.fixture
-def own_code(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Members that a test takes from files are gone after it."""
-    monkeypatch.setattr(code_file, "_files", {})
-    before = {*DOUBTS}
-    yield
-    for name in {*DOUBTS} - before:
-        del DOUBTS[name]
-
-
-@pytest.mark.usefixtures("own_code")
 def test_a_rule_from_a_file_is_compared_with_those_that_ship(lab: Any, datasets: dict[str, Path], root: Path) -> None:
     words = "mentor", str(datasets["taken"]), "--window", "2", "--json", "--rule"
     ran = lab(*words, f"{root}/examples/own_doubt.py:Hesitation")
@@ -102,7 +88,6 @@ class Learns(lab.Doubt):
 """
 
 
-@pytest.mark.usefixtures("own_code")
 def test_a_rule_that_learns_no_arrays_is_refused_before_anything_is_kept(
     lab: Any, datasets: dict[str, Path], tmp_path: Path
 ) -> None:

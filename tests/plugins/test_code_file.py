@@ -12,7 +12,6 @@ from lab.plugins.family import Family
 
 @pytest.fixture(autouse=True)
 def fresh(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(code_file, "_files", {})
     monkeypatch.chdir(tmp_path)
 
 

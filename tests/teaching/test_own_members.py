@@ -5,14 +5,12 @@ from typing import Any
 
 import pytest
 
-from lab.plugins import code_file
 from lab.plugins.family import Family
 from lab.teaching import own_members
 
 
 def test_what_no_lesson_has_is_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     gates: Family[Any] = Family("gates", {}, lambda name, thing: thing)
-    monkeypatch.setattr(code_file, "_files", {})
     monkeypatch.setattr(own_members, "FAMILIES", {"gates": gates})
     (tmp_path / "mine.py").write_text("GATE = 7\n")
     word = f"{tmp_path}/mine.py:GATE"
