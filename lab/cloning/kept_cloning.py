@@ -90,9 +90,9 @@ def rounds_of(
         yield from cloned(roll_out, shown, options, hears=Hears(question))
         return
     if not (folder / SESSION).exists():
-        problem = replace(kept.problem, task=whole_path(kept.problem.task) or "")
-        begun = replace(kept, problem=problem, task_hash=hash_of(load(kept.problem.task)))
-        _write(folder / SESSION, json.dumps(asdict(begun), indent=1))
+        written = asdict(replace(kept, task_hash=hash_of(load(problem.task))))
+        written["problem"]["task"] = whole_path(problem.task)
+        _write(folder / SESSION, json.dumps(written, indent=1))
     if not (folder / DEMONSTRATIONS).is_dir():
         write(demonstrations or _demonstrated(kept, folder, person), folder / DEMONSTRATIONS)
     rmtree(folder / f"{BEGUN}{DEMONSTRATIONS}", ignore_errors=True)
