@@ -127,7 +127,7 @@ def _own_members_are_gone_afterwards(monkeypatch: pytest.MonkeyPatch) -> Iterato
 
     def noted(family: Family[Any], name: str, thing: Any, source: str) -> None:
         adopted(family, name, thing, source)
-        if not source.startswith("package "):  # those of installed packages are loaded once, by whoever needs them first
+        if not source.startswith("package "):  # installed: those are loaded once, by whoever needs them first
             added.append((family, name))
 
     monkeypatch.setattr(Family, "adopted", noted)
