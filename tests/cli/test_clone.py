@@ -12,6 +12,7 @@ from lab.recordings.lerobot_read import read
 SHORT = ("--demonstrations", "1", "--evaluated", "1", "--epochs", "2", "--rule", "always", "--questions", "1")
 
 
+@pytest.mark.slow
 def test_it_clones_asks_and_goes_on(lab: Callable[..., Any], tmp_path: Path) -> None:
     out = tmp_path / "grasp"
     first = lab("clone", "grasp", *SHORT, "--rounds", "0", "--out", str(out), "--json").json

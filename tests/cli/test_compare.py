@@ -19,6 +19,7 @@ def maze(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     Path("maze.txt").write_text("S..\n.#.\n..G\n")
 
 
+@pytest.mark.slow
 def test_every_combination_is_in_the_rows(lab: Lab) -> None:
     words = ("--gate", "ccrl, ia", "--advisor", "expert,none", "--episodes", "12", "--memory", "true")
     ran = lab("study", "compare", "maze.txt", *words, "--sessions", "3", "--out", "out", "--json")

@@ -41,6 +41,7 @@ def test_a_policy_is_kept_by_name_and_decides_in_another_cell(lab: Lab, folder: 
     assert all(sound for _, sound, _ in Toolbox("box").verify())
 
 
+@pytest.mark.slow
 def test_learning_goes_on_from_a_policy(lab: Lab, folder: Path) -> None:
     """Its own run is the first episode; what is learned on is kept in place of it."""
     asked(lab, f"{LEARN} --keep-policy one.json")

@@ -96,6 +96,7 @@ def run(prepared: Prepared) -> Done:
     return Done(durations, outcome, recording, moves)
 
 
+@pytest.mark.slow
 def test_a_part_and_its_pallet_are_carried_in_their_order(run: Done) -> None:
     _, outcome, recording, moves = run
     assert (outcome.failure, outcome.retries) == (None, ())

@@ -11,6 +11,7 @@ Lab = Callable[..., Any]
 PROCESS_S = 60.0
 
 
+@pytest.mark.slow
 def test_each_of_two_parts_stands_in_the_machine_for_its_own_time(lab: Lab, folder: Path) -> None:
     """The first box left after 13 of 60 seconds, as long as the machine's clock was that of the second."""
     assert lab("new", "pair", "--part", "box:0.05x0.03x0.04:2", "--machine", f"oven:{PROCESS_S:g}").code == 0
