@@ -235,6 +235,8 @@ def _rows(record: _Record, problem: "Mapping[str, Any] | None") -> Iterator[tupl
     when = str(record.values.get("when", "")).strip().lower()
     if vehicle is not None:
         kind: Kind = word if word in KINDS else "carry" if part else "empty"
+        if kind == "carry" and part is None:
+            raise record.refusal("a part in a row that says 'carry', or 'empty' in its place")
         start = origin or next(iter(stations), None)
         yield when, TimedRow(part, kind, vehicle, start, record.name("target"), start_s, end_s)
         return

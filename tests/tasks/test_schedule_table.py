@@ -141,6 +141,10 @@ def test_where_stations_stand(tmp_path: Path) -> None:
         ("job,machine,start,end\nA,saw,5,3\n", "line 2: wanted an end that is not before the start, 5 s, not '3 s'"),
         ("job,machine,start,end\nA,saw,5\n", "line 2: wanted 4 values, as the header has, not '3: A,saw,5'"),
         ("job,machine,start,end\nA,saw,5,\n", "line 2: wanted an end or a duration in every row"),
+        (
+            "job,operation,robot,from,to,start,end\nA,carry,arm,in,saw,0,3\n,carry,arm,saw,out,4,6\n",
+            "line 3: wanted a part in a row that says 'carry'",
+        ),
         ("job,machine,start,end\nA,saw,0,1\nB,saw,2026-01-01,2026-01-02\n", "line 3: wanted all times to be numbers or all"),
         ("job,machine,start,end\n", "none has a start and an end"),
         ("", "wanted a header such as part,station,start,end"),
