@@ -104,15 +104,16 @@ def _rolled_out(rollouts: Path, failed: str | None, recording: Any) -> Any:
             )
     if failed is None:
         return alone
-    numbers = set[int]()
-    for word in failed.split(",") if failed != "none" else ():
-        if not word.strip().isdecimal() or int(word) >= len(alone.episodes):
-            raise BadInput(
-                f"'{shortened(word)}' (--failed): wanted numbers of episodes from 0 to {len(alone.episodes) - 1}, such as 0,7, "
-                "or none"
-            )
-        numbers.add(int(word))
-    marked = [replace(episode, success=number not in numbers) for number, episode in enumerate(alone.episodes)]
+    known = [str(number) for number in range(len(alone.episodes))]
+    named = [word.strip() for word in failed.split(",")] if failed != "none" else []
+    wrong = next((word for word in named if word not in known), None)
+    if wrong is not None:
+        raise BadInput(
+            f"'{shortened(wrong)}' (--failed): wanted numbers of episodes from 0 to {len(known) - 1}, such as 0,7, or none"
+        )
+    marked = [
+        replace(episode, success=number not in named) for number, episode in zip(known, alone.episodes, strict=True)
+    ]
     return replace(alone, episodes=marked)
 
 

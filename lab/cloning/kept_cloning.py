@@ -18,8 +18,7 @@ from lab.mentor.mentor import Mentor
 from lab.recordings.episode import Episode, Recording
 from lab.recordings.lerobot_read import read
 from lab.recordings.lerobot_write import write
-from lab.tasks.record import read_json
-from lab.tasks.task import hash_of
+from lab.tasks.record import hash_of, read_json
 from lab.tasks.task_file import load, whole_path
 
 SESSION, MEASURED = "session.json", "measured.json"

@@ -329,8 +329,8 @@ def learned_by(rule: str, demonstrated: Demonstrated, rollouts: Sequence[Episode
     try:
         arrays = {str(name): np.asarray(array, np.float64) for name, array in learned.items()}
     except (AttributeError, TypeError, ValueError):
-        arrays = {"": np.array(np.nan)}
-    if not all(np.isfinite(array).all() for array in arrays.values()):
+        arrays = None
+    if arrays is None or not all(np.isfinite(array).all() for array in arrays.values()):
         raise BadInput(
             f"rule '{rule}' (mentor): what it learned is {shortened(repr(learned))}: wanted arrays of finite numbers, by name"
         )

@@ -12,7 +12,8 @@ from lab.production import deferred
 from lab.production.cyclic_order import check_parts, mix_of
 from lab.production.run_journal import RunBegan, RunJournal, read_run
 from lab.sequencing import SEQUENCERS, check_method
-from lab.tasks.task import Task, hash_of
+from lab.tasks.record import hash_of
+from lab.tasks.task import Task
 from lab.tasks.task_file import load, whole_path
 from lab.teaching.kept_session import check_alone, check_named
 from lab.teaching.lesson_options import LessonOptions, SessionOptions, recorded_whole

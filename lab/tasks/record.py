@@ -1,5 +1,6 @@
 """The base of all file records: frozen, checked fields; names; settings of learning; and reading and writing of texts."""
 
+import hashlib
 from dataclasses import asdict, replace
 from math import inf, isfinite
 from pathlib import Path
@@ -183,6 +184,11 @@ def read_json(path: Path, kind: type[Kept], which: str, wanted: str, most_bytes:
         raise BadInput(f"{which}: {first_fault(error)}: {wanted}") from None
     except BadInput as error:  # what the record itself refuses
         raise BadInput(f"{which}: {error}") from None
+
+
+def hash_of(record: Record) -> str:
+    """A hash (24 hex digits) of all that a record says, such as a task; what was kept of it is resumed only with the same one."""
+    return hashlib.sha256(record.model_dump_json(exclude_defaults=True).encode()).hexdigest()[:24]
 
 
 def write_whole(path: Path, text: str) -> None:

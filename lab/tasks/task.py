@@ -1,6 +1,5 @@
 """The task: a cell in physics, the kinds of parts made in it, and the settings with which its sub-tasks are learned."""
 
-import hashlib
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -400,8 +399,3 @@ def check_number(parts: int) -> None:
     """Raises BadInput unless 1 <= parts <= 50."""
     if not 1 <= parts <= MAX_PARTS:
         raise BadInput(f"{parts} toasts (--toasts): allowed are 1 to {MAX_PARTS}")
-
-
-def hash_of(task: Task) -> str:
-    """A hash (24 hex digits) of all that a task says; what was kept of it is resumed only with the same one."""
-    return hashlib.sha256(task.model_dump_json(exclude_defaults=True).encode()).hexdigest()[:24]

@@ -109,6 +109,7 @@ def test_a_rule_that_learns_no_arrays_is_refused_before_anything_is_kept(
         (["{shown}", "--rollouts", "{alone}", "--keep", "m", "--failed", "1,9"], "'9' (--failed): wanted numbers"),
         (["{shown}", "--rollouts", "{alone}", "--keep", "m", "--failed", "-1"], "'-1' (--failed)"),
         (["{shown}", "--rollouts", "{alone}", "--keep", "m", "--failed", ""], "'' (--failed)"),
+        (["{shown}", "--rollouts", "{alone}", "--keep", "m", "--failed", "9" * 5000], "(--failed): wanted numbers"),
         (["{shown}"], "takeovers"),
         (["{taken}", "--keep", "x"], "--rollouts"),
         (["{taken}", "--rule", "failure"], "--keep"),

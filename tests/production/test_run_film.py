@@ -16,7 +16,7 @@ from lab.sim.scene.places import Layout
 from lab.sim.scene.scene import Scene
 from lab.sim.world import TIME_STEP, World
 from lab.skills.camera_grids import overhead_camera
-from lab.tasks.task import hash_of
+from lab.tasks.record import hash_of
 from lab.tasks.task_file import load
 from lab.vision import Image
 
