@@ -3,13 +3,14 @@
 from csv import DictReader
 from dataclasses import asdict, dataclass
 from io import StringIO
+from math import inf
 from pathlib import Path
 from typing import Any
 
 from lab.audit.evidence import Evidence, Finding, Struck
 from lab.audit.rules import findings
 from lab.audit.tracks import FILE, read_tracks
-from lab.errors import BadInput
+from lab.errors import BadInput, shortened
 from lab.files import json_of, read_limited
 from lab.tasks.task import Order, Task
 
@@ -72,7 +73,9 @@ def kept_evidence(folder: Path, task: Task, order: Order) -> Evidence:
     where = f"run '{folder}'"
     try:
         run = json_of(read_limited(folder / "run.json"))
-        claimed = [str(name) for name in run["audit"]["claimed"]]
+        claimed = run["audit"]["claimed"]
+        if not isinstance(claimed, list) or not all(isinstance(name, str) for name in claimed):
+            raise ValueError(f"claimed parts {shortened(repr(claimed))}: wanted a list of names")
         kept = run["audit"].get("plan_kept") is True
         struck = [
             Struck(str(fault["what"]), str(fault["part"]), str(fault["station"])) for fault in run["audit"]["struck"]
@@ -97,5 +100,7 @@ def schedule_rows(text: str) -> dict[str, list[dict[str, Any]]]:
         if not {"part", "operation", "station", "target", "robot"} <= row.keys():
             raise ValueError("schedule.csv lacks a column")
         own: dict[str, Any] = row | {"start_s": float(row["start_s"]), "end_s": float(row["end_s"])}
+        if not 0.0 <= own["start_s"] <= own["end_s"] < inf:
+            raise ValueError(f"schedule.csv has a row from {row['start_s']} to {row['end_s']} s")
         rows[row["when"]].append(own)
     return rows

@@ -358,6 +358,9 @@ def test_the_rows_of_a_schedule() -> None:
     assert [(row["start_s"], row["end_s"]) for row in rows["planned"]] == [(1.5, 3.0)]
     with pytest.raises((ValueError, KeyError)):
         schedule_rows(header + "cube 1,cube,carry,in,oven,robot,robot,soon,4,measured\n")
+    for start, end in (("nan", "4"), ("0", "inf"), ("-1", "4"), ("4", "2")):
+        with pytest.raises(ValueError, match=f"a row from {start} to {end} s"):
+            schedule_rows(header + f"cube 1,cube,carry,in,oven,robot,robot,{start},{end},measured\n")
 
 
 def headed(case: Evidence, *low: tuple[float, float]) -> list[tuple[str, str, str]]:
